@@ -12,7 +12,7 @@ from components.guidance.daidalus import (
     ConfParameters,
     changes_out_of_bands,
     explain_no_steering,
-    smaller,
+    smaller_change,
 )
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, ChosenSides, Manoeuvre, Manoeuvres
@@ -20,7 +20,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 
 _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
 # Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
@@ -75,7 +75,7 @@ class TurnOutParameters(ConfParameters):
 
 
 class TurnOut(Component):
-    """Steers the ownship by the smallest change that leads clear, when an alert is due.
+    """When alerted, steers the ownship by the smallest manoeuvre that leads clear of conflicts.
 
     The change is one of direction, altitude, ground speed or vertical speed. The bands are those of
     DAIDALUS, each instant by itself, over all targets whose flights the alerting knows. Where no
@@ -102,12 +102,12 @@ class TurnOut(Component):
 
     @classmethod
     def may_climb(cls, parameters: TurnOutParameters) -> bool:
-        """Return whether it ever commands another altitude."""
+        """Return whether the block ever commands a climb, a descent or another altitude."""
         return parameters.manoeuvre in ("climb", "vertical_speed")
 
     def setup(self) -> None:
         """Read the configuration; start free to turn."""
-        self._configuration, self._alerter = self.p.read()
+        self._configuration, self._alerter = self.p.read_configuration()
         rate_deg_s = math.degrees(self._configuration["turn_rate"])
         if 0.0 < rate_deg_s < SLOWEST_TURN_DEG_S:
             raise ValueError(
@@ -132,7 +132,7 @@ class TurnOut(Component):
                 )
 
     def records(self) -> list[type[Message]]:
-        """Return the recorded message types: chosen sides only where they are sent."""
+        """Return the types to record: manoeuvres, and chosen sides if it has an address."""
         return [Manoeuvres] if self.p.address is None else [*super().records()]
 
     def offer(self, port: str) -> int | None:
@@ -140,11 +140,11 @@ class TurnOut(Component):
         return self.p.address
 
     def request(self, port: str) -> int | None:
-        """Return the same: what is told is to say whom it is meant for."""
+        """Return this aircraft's address on port ``told``, for others' choices; None elsewhere."""
         return self.p.address if port == "told" else None
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often it was to steer, and no change led clear."""
+        """Return, by message, how often per run a manoeuvre was needed and none led clear."""
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
@@ -156,11 +156,11 @@ class TurnOut(Component):
     def run(self, wake: Wake) -> dict[str, Message]:
         """Look at every instant with an alert."""
         alerts: AlertLevels | None = wake["alerts"]
-        self._take_choices(wake)
+        self._store_choices(wake)
         if alerts is None:
             return {}
         manoeuvres: dict[int, Manoeuvre] = {}
-        alerted = np.flatnonzero(alerts.highest() >= self.p.level)
+        alerted = np.flatnonzero(alerts.highest_levels() >= self.p.level)
         left = zip(alerted.tolist(), wake.run[alerted].tolist(), strict=True)
         waiting = list(left)
         told: dict[int, int] = {}
@@ -173,24 +173,24 @@ class TurnOut(Component):
                 tick = int(wake.ticks[index])
                 if run in now:
                     later.append((index, run))
-                elif self._is_free(run, tick) or self._must_give_way(run, tick):
+                elif self._is_free_to_manoeuvre(run, tick) or self._must_give_way(run, tick):
                     now[run] = index
                 elif self.p.address is not None:
-                    told[index] = self._repeated_side(run, tick)
+                    told[index] = self._renewed_own_side(run, tick)
             rows = list(now.values())
             result = changes_out_of_bands(kind, self._configuration, self._alerter, alerts, rows)
             for (run, index), changes in zip(now.items(), result, strict=True):
                 tick = int(wake.ticks[index])
-                change = None if changes is None else self._choose(run, tick, changes)
-                if changes is not None and self._is_free(run, tick):
+                change = None if changes is None else self._choose_change(run, tick, changes)
+                if changes is not None and self._is_free_to_manoeuvre(run, tick):
                     due = np.array([run])
-                    self._stuck = count_cases(self._stuck, due[: change is None], due)
+                    self._stuck = add_cases(self._stuck, due[: change is None], due)
                 if change is not None:
-                    manoeuvres[index] = self._manoeuvre(change)
+                    manoeuvres[index] = self._manoeuvre_of_change(change)
                     self._free_from[run] = tick + self._pause_ticks
                     self._chosen[run] = tick, 1 if change > 0.0 else -1
                 if self.p.address is not None:
-                    told[index] = self._repeated_side(run, tick)
+                    told[index] = self._renewed_own_side(run, tick)
             waiting = later
         messages = {
             "manoeuvres": Manoeuvres.at_rows(wake.instants, manoeuvres),
@@ -201,7 +201,7 @@ class TurnOut(Component):
     def _sides_for_others(
         self, wake: Wake, alerts: AlertLevels, told: dict[int, int]
     ) -> ChosenSides | None:
-        """Return the sides chosen at some rows, for everybody whom the alerts there are of."""
+        """Return the sides chosen at some rows, addressed to each aircraft an alert concerns."""
         address = {
             one.platform: one.request for one in self.context.consumers if one.port == "told"
         }
@@ -215,8 +215,8 @@ class TurnOut(Component):
             meant_for[entries],
         )  # fmt: skip
 
-    def _take_choices(self, wake: Wake) -> None:
-        """Store the latest manoeuvre choice of each other aircraft."""
+    def _store_choices(self, wake: Wake) -> None:
+        """Store choices received from other aircraft and forget those no longer valid."""
         since = int(wake.ticks.min()) - int(self.p.heeds_s * self.context.ticks_per_s)
         for new in wake.arrivals("told") if self.p.address is not None else ():
             sides = new.message
@@ -229,7 +229,7 @@ class TurnOut(Component):
                 self._heard[run] = (*known, (one[0], one[1], one[2]))
 
     def _find_valid_choices(self, run: int, tick: int) -> list[tuple[int, int]]:
-        """Return address and side of every other aircraft whose choice is valid at an instant.
+        """Return (address, side) of others whose choice is recent enough to be valid.
 
         The lowest address first; windows may know more than has come by then.
         """
@@ -237,48 +237,52 @@ class TurnOut(Component):
         last = {a: side for at, a, side in self._heard.get(run, ()) if since < at <= tick}
         return sorted(last.items())
 
-    def _matching_side(self, side: int) -> int:
-        """Return the side that goes with another one's: both to the right, one up and one down."""
+    def _compatible_side(self, side: int) -> int:
+        """Return the side compatible with another aircraft's choice: the same for turns, the
+        opposite for climbs and descents.
+        """
         return side if self.p.manoeuvre == "turn" else -side
 
-    def _repeated_side(self, run: int, tick: int) -> int:
-        """Return the side that was chosen in this conflict, which an alert prolongs; 0: none."""
+    def _renewed_own_side(self, run: int, tick: int) -> int:
+        """Return and renew the side already chosen in the present conflict; 0 if none."""
         at, side = self._chosen.get(run, (-1, 0))
         if not side or tick - at > int(self.p.heeds_s * self.context.ticks_per_s):
             return 0
         self._chosen[run] = tick, side
         return side
 
-    def _is_free(self, run: int, tick: int) -> bool:
-        """Return whether the last manoeuvre is long enough ago to begin another."""
+    def _is_free_to_manoeuvre(self, run: int, tick: int) -> bool:
+        """Return whether the last manoeuvre is long enough ago for a new one to begin."""
         return tick >= self._free_from.get(run, 0)
 
     def _must_give_way(self, run: int, tick: int) -> bool:
         """Return whether an aircraft of lower address has chosen a manoeuvre that conflicts."""
-        mine = self._repeated_side(run, tick) if self.p.address is not None else 0
+        mine = self._renewed_own_side(run, tick) if self.p.address is not None else 0
         first = [
             side for a, side in self._find_valid_choices(run, tick) if a < (self.p.address or 0)
         ]
-        return bool(mine and first and self._matching_side(first[0]) != mine)
+        return bool(mine and first and self._compatible_side(first[0]) != mine)
 
-    def _choose(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
-        """Return the change to fly: the smaller one, or the one compatible with the others'
-        choices.
+    def _choose_change(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
+        """Return the change to fly, or None: one compatible with other aircraft's choices if they
+        have any, else the smaller of the two `changes`.
 
         Without a way there it is free, but not before its time.
         """
         others = self._find_valid_choices(run, tick) if self.p.address is not None else []
         if others:
-            (address, side), mine = others[0], self._repeated_side(run, tick)
+            (address, side), mine = others[0], self._renewed_own_side(run, tick)
             # Only a lower address changes what was chosen in this conflict.
             keeps = mine and address > (self.p.address or 0)
-            there = changes[1] if (mine if keeps else self._matching_side(side)) > 0 else changes[0]
+            there = (
+                changes[1] if (mine if keeps else self._compatible_side(side)) > 0 else changes[0]
+            )
             if math.isfinite(there):
                 return there
-        return smaller(changes) if self._is_free(run, tick) else None
+        return smaller_change(changes) if self._is_free_to_manoeuvre(run, tick) else None
 
-    def _manoeuvre(self, change: float) -> Manoeuvre:
-        """Return the manoeuvre that makes a change."""
+    def _manoeuvre_of_change(self, change: float) -> Manoeuvre:
+        """Return the manoeuvre (turn, climb or speed change) that carries out a change."""
         conf = self._configuration
         if self.p.manoeuvre == "climb":
             beyond_m = math.copysign(self.p.beyond_m, change)

@@ -3,8 +3,8 @@
 from pathlib import Path
 
 
-def folder() -> Path:
-    """Return the folder of the shipped scenes and studies: in the package, or in its source."""
+def configs_folder() -> Path:
+    """Return the folder of shipped scenes and studies: in the installed package or source tree."""
     here = Path(__file__).parent
     packaged = here / "configs"
     return packaged if packaged.is_dir() else here.parent / "configs"

@@ -14,7 +14,7 @@ from dsa_des.block.wake import Wake
 
 
 class Gate(Component):
-    """Decides for every sensor and target whether the sensor's physics is needed, and why not.
+    """Decides which targets' detection each sensor must compute, with the reason where not.
 
     A target is skipped when the sensor is switched off, when it is not the sensor's scan time,
     when the target is not there, when it is outside the field of view or
@@ -33,11 +33,11 @@ class Gate(Component):
     )  # fmt: skip
 
     def request(self, port: str) -> FarthestLook:
-        """Return a request for the targets that some sensor may look at."""
+        """Return the union of all connected sensors' requests: farthest range, widest angles."""
         return farthest_look(consumer.request for consumer in self.context.consumers)
 
     def offer(self, port: str) -> Any:
-        """Pass on what we were offered."""
+        """Return the offer of the block upstream unchanged, or None without one."""
         return self.context.producers[0].offer if self.context.producers else None
 
     def setup(self) -> None:
@@ -66,9 +66,9 @@ class Gate(Component):
         for sensor, reach in self._reach.items():
             rows = wake.demand.get(sensor)
             if rows is None or len(rows) == len(targets):
-                rows, reason = np.arange(len(targets)), reach.decide(*where)
+                rows, reason = np.arange(len(targets)), reach.skip_reasons(*where)
             elif len(rows):
-                reason = reach.decide(*(values.take(rows, axis=0) for values in where))
+                reason = reach.skip_reasons(*(values.take(rows, axis=0) for values in where))
             else:
                 reason = np.empty((0, width), dtype=np.uint8)
             decisions[sensor] = Decision(rows, reason, len(targets))

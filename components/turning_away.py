@@ -7,14 +7,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import describe_rangeless
+from components.messages.detections import names_of_rangeless_sensors
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 
 
 class TurnAwayParameters(Parameters):
@@ -81,7 +81,7 @@ class TurnAway(Component):
 
     @classmethod
     def may_climb(cls, parameters: TurnAwayParameters) -> bool:
-        """Return that it never commands another altitude."""
+        """Return False: this block only turns."""
         return False
 
     def setup(self) -> None:
@@ -93,14 +93,14 @@ class TurnAway(Component):
         self._rangeless = NO_COUNTS
 
     def warnings(self) -> list[str]:
-        """Warn that no sensor measures the range that it needs."""
-        blind = "" if self.p.without_range else describe_rangeless(self.context.producers)
+        """Return a warning if no sensor measures the range that the block needs to act."""
+        blind = "" if self.p.without_range else names_of_rangeless_sensors(self.context.producers)
         if not blind:
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how many tracks had no range and were not acted on."""
+        """Return, by message, the tracks per run not acted on because they had no range."""
         return (
             {}
             if self.p.without_range
@@ -116,7 +116,7 @@ class TurnAway(Component):
         row = tracks.row_of_entries
         rangeless = np.isnan(tracks.range_m)
         of = take_runs(tracks.run, row)
-        self._rangeless = count_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
+        self._rangeless = add_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
         if self.p.without_range:
             near |= rangeless
         manoeuvres: dict[int, Manoeuvre] = {}
@@ -128,12 +128,12 @@ class TurnAway(Component):
             entries = np.flatnonzero(near & (row == index))
             ranges_m = np.nan_to_num(tracks.range_m[entries], nan=np.inf)
             nearest = entries[np.argmin(ranges_m)]
-            manoeuvres[index] = self._turn(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
+            manoeuvres[index] = self._turn_manoeuvre(on_the_left=tracks.azimuth_rad[nearest] <= 0.0)
             self._free_from[run] = tick + self._pause_ticks
         return Manoeuvres.at_rows(wake.instants, manoeuvres)
 
-    def _turn(self, *, on_the_left: bool) -> Manoeuvre:
-        """Return the turn away from an aircraft on one side."""
+    def _turn_manoeuvre(self, *, on_the_left: bool) -> Manoeuvre:
+        """Return the turn to command, by configuration, for an aircraft on the left or right."""
         to_the_right = {"away": on_the_left, "towards": not on_the_left}
         right = to_the_right.get(self.p.direction, self.p.direction == "right")
         bank_deg = self.p.bank_deg or 0.0

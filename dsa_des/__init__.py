@@ -8,8 +8,8 @@ import os
 import sys
 
 
-def _without_working_directory() -> None:
-    """Take the working directory off the module path, where ``python -m`` puts it first.
+def _drop_working_directory_from_path() -> None:
+    """Remove the working directory from ``sys.path`` if started as ``python -m dsa_des``.
 
     A ``re.py`` or a folder ``components`` there is not ours: this comes before any import that
     Python has not made already. The folder that we were imported from stays.
@@ -20,7 +20,7 @@ def _without_working_directory() -> None:
         del sys.path[0]
 
 
-_without_working_directory()
+_drop_working_directory_from_path()
 
 from importlib import import_module  # noqa: E402
 from typing import TYPE_CHECKING, Any  # noqa: E402

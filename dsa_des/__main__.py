@@ -7,7 +7,7 @@ import gc
 import os
 import signal
 
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 _NEW_OBJECTS_PER_COLLECTION = 300_000
 
@@ -18,7 +18,7 @@ def start() -> None:
     # tenth of the time to start. A short run ends with some 140,000 objects: it never looks.
     gc.set_threshold(_NEW_OBJECTS_PER_COLLECTION, 20, 50)
     try:
-        with plain_ending():
+        with exit_plainly_on_signal():
             from dsa_des.cli import main
 
             main()

@@ -185,14 +185,14 @@ def test_drawing_loss_and_jitter_is_what_everything_means(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     drawn = set()
-    lateness = WireFaults.lateness
+    lateness = WireFaults.lateness_ticks
 
     def seen(faults: WireFaults, ticks: np.ndarray) -> np.ndarray:
         late = lateness(faults, ticks)
         drawn.add((bool(np.any(faults.jitter_ticks > 0)), bool(np.any(late))))
         return late
 
-    monkeypatch.setattr(WireFaults, "lateness", seen)
+    monkeypatch.setattr(WireFaults, "lateness_ticks", seen)
     scene = with_late_wires(tmp_path)
     Simulation(scene).run()
     assert drawn == {(True, True)}
@@ -263,7 +263,7 @@ def test_what_a_tolerance_leaves_out_stays_inside_it_over_80_scenes() -> None:
         cells = PathCells(range_m, own, high)
         rcs = np.full(300, 10.0 ** rng.uniform(-2, 2))
         pd = [
-            block._pd(
+            block._pd_of_model(
                 block.echo_snr(cells, rcs), changes["swerling"], None,
                 changes["pulses"], changes["false_alarm_probability"],
             )

@@ -17,7 +17,9 @@ from dsa_des.time.randomness import target_keys
 
 
 class VisibleAreas(Parameters):
-    """The three bodies of the thesis's aircraft model, as an EO camera sees them (§3.5.2)."""
+    """Areas of the three bodies that stand for an aircraft in an EO camera's picture: sphere,
+    cylinder and horizontal plane (thesis §3.5.2).
+    """
 
     front_m2: float = Field(ge=0, description="Area of the sphere, m² (Table 3.1).")
     side_m2: float = Field(ge=0, description="Area of the cylinder seen abeam, m².")
@@ -35,7 +37,7 @@ class VisibleAreas(Parameters):
 
 
 class InfraredAreas(VisibleAreas):
-    """The same for an IR camera, with a back of its own (§3.5.3, Tables 3.2 and 4.6)."""
+    """The same areas for an IR camera, and one from behind (§3.5.3, Tables 3.2 and 4.6)."""
 
     back_m2: float = Field(ge=0, description="Area of the sphere seen from behind, m².")
 
@@ -69,7 +71,7 @@ class LaserSurface(Parameters):
     )
 
     @model_validator(mode="after")
-    def _wire_or_surface(self) -> Self:
+    def _check_wire_or_surface(self) -> Self:
         if (self.wire_diameter_mm is None) != (self.wire_length_m is None):
             raise ValueError("wire_diameter_mm and wire_length_m belong together: give both")
         if self.wire_diameter_mm is not None and self.area_m2 is not None:
@@ -129,7 +131,7 @@ class Aircraft(Parameters):
 
     @field_validator("ads_b", mode="before")
     @classmethod
-    def _broadcasts_or_not(cls, given: Any) -> Any:
+    def _replace_false_by_none(cls, given: Any) -> Any:
         return None if given is False else given
 
 
@@ -140,8 +142,8 @@ OWNSHIP = "ownship"
 _LEAST_EXTENT_M = 0.01
 
 
-def _is_alike(one: Aircraft, other: Aircraft) -> bool:
-    """Return whether two aircraft are the same to every sensor, wherever they fly."""
+def _has_equal_fields(one: Aircraft, other: Aircraft) -> bool:
+    """Return whether two aircraft agree in every field, so that no sensor can tell them apart."""
     return one is other or all(
         getattr(one, name) == getattr(other, name) for name in Aircraft.model_fields
     )
@@ -149,7 +151,7 @@ def _is_alike(one: Aircraft, other: Aircraft) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Roster:
-    """The targets of a run: their names, their draw keys and what sensors need of them.
+    """A run's targets: names, random-draw keys, and the aircraft properties that sensors need.
 
     Replicas in lock step may have other aircraft of the same names: columns, and indices of tables,
     are then over the aircraft of the first replica, those of the second, and so on. Of whoever
@@ -184,7 +186,7 @@ class Roster:
         return cls(names, aircraft, own[0], (own[1],))
 
     def seen_from(self, target: int) -> "Roster":
-        """Return the roster as seen from a target: the target and the ownship are exchanged."""
+        """Return the roster that a sensor on this target sees: it and the ownship swap places."""
         known: dict[int, Roster] = self.__dict__.setdefault("_seen_from", {})
         if target not in known:
             width, own = len(self.names), self.own_aircraft
@@ -207,8 +209,8 @@ class Roster:
             and self.names == other.names
             and self.own_name == other.own_name
             and self.later == other.later
-            and all(map(_is_alike, self.aircraft, other.aircraft))
-            and all(map(_is_alike, self.own_aircraft, other.own_aircraft))
+            and all(map(_has_equal_fields, self.aircraft, other.aircraft))
+            and all(map(_has_equal_fields, self.own_aircraft, other.own_aircraft))
         )
 
     def __hash__(self) -> int:
@@ -216,14 +218,14 @@ class Roster:
 
     @cached_property
     def keys(self) -> AnyArray:
-        """64-bit keys of the targets' random draws, shape (targets,)."""
+        """64-bit keys (targets,) that seed each target's random draws, made from its name."""
         return target_keys(self.names)
 
-    def keys_of(self, targets: IntArray) -> AnyArray:
-        """Return the keys of some targets (n,); those not asked for are never made."""
+    def draw_keys_of(self, targets: IntArray) -> AnyArray:
+        """Return the 64-bit random-draw keys (n,) of these targets, without computing others."""
         if "keys" in self.__dict__:
             return self.keys[targets]
-        keys, known = self._keys_so_far
+        keys, known = self._draw_keys_computed
         there = known[targets]
         if np.count_nonzero(there) < there.size:
             new = np.unique(targets[~there])
@@ -232,7 +234,7 @@ class Roster:
         return keys[targets]
 
     @cached_property
-    def _keys_so_far(self) -> tuple[AnyArray, AnyArray]:
+    def _draw_keys_computed(self) -> tuple[AnyArray, AnyArray]:
         return np.zeros(len(self.names), dtype=np.uint64), np.zeros(len(self.names), dtype=bool)
 
     @cached_property
@@ -242,10 +244,7 @@ class Roster:
 
     @cached_property
     def extents_m(self) -> FloatArray:
-        """Length, span and height (targets, 3), m, of each target by its bodies as an EO camera
-        sees them: those of the fuselage, a round body of the front's and the side's area, and of a
-        wing three times as wide as deep.
-        """
+        """Length, span, height (targets, 3), m, by target, from its areas in an EO camera."""
         front, side, plane = (
             self.column(f"eo.{body}_m2") for body in ("front", "side", "horizontal")
         )
@@ -257,12 +256,12 @@ class Roster:
 
     @cached_property
     def equipage(self) -> Equipage:
-        """Return what surveillance equipment each aircraft carries, and how that changes later."""
+        """Surveillance equipment of every aircraft, with further rows for each later change."""
         every = [*self.aircraft, *(one for _, then in self.later for one in then.aircraft)]
         return Equipage.from_aircraft(every, np.tile(self.keys, len(every) // max(1, len(self))))
 
     def equipage_rows(self, craft: IntArray, instant_ns: IntArray) -> IntArray:
-        """Return the rows of `equipage` for some of the aircraft at instants of the run."""
+        """Return rows of `equipage` for these aircraft (indices) at these instants, elementwise."""
         if not self.later:
             return craft
         begins_ns = [from_ns for from_ns, _ in self.later]
@@ -289,16 +288,16 @@ class Roster:
         return tuple(sorted({craft.swerling % 5 for craft in self.aircraft}))
 
     @property
-    def is_shared(self) -> bool:
+    def is_same_in_all_replicas(self) -> bool:
         """Return whether all replicas have the same aircraft."""
         return len(self.aircraft) == len(self.names)
 
-    def craft(self, target: IntArray, replica: IntArray) -> IntArray:
-        """Return which of the aircraft some targets of replicas are."""
-        return target if self.is_shared else replica * len(self.names) + target
+    def aircraft_index(self, target: IntArray, replica: IntArray) -> IntArray:
+        """Return the index into `aircraft` of each target in each replica, elementwise."""
+        return target if self.is_same_in_all_replicas else replica * len(self.names) + target
 
     def column(self, path: str) -> FloatArray:
-        """Return one number per target, for example ``"ir.front_m2"``, shape (targets,)."""
+        """Return every aircraft's number (aircraft,) at an attribute path like ``ir.front_m2``."""
         columns: dict[str, FloatArray] = self.__dict__.setdefault("_columns", {})
         if path not in columns:
             read = attrgetter(path)
@@ -306,8 +305,8 @@ class Roster:
         return columns[path]
 
     def tables(self, path: str) -> tuple[tuple[Any, ...], IntArray]:
-        """Return the tables that targets name at a path such as ``"eo.silhouette_table"``, each
-        once in the order of the targets, and the index (targets,) of each one's, -1 without.
+        """Return each different table found at an attribute path such as ``eo.silhouette_table``,
+        and for every aircraft the index of its table, -1 for none.
         """
         cache: dict[str, Any] = self.__dict__.setdefault("_tables", {})
         if path not in cache:
@@ -326,16 +325,17 @@ class Roster:
         return result
 
 
-#: What other aircraft of replicas may have of their own; see `joint_roster`.
+#: What other aircraft of replicas may have of their own; see `merge_replica_rosters`.
 _MAY_DIFFER = ("rcs_dbsm", "mode_s", "mode_c", "ads_b", "icao_address")
 
 
-def joint_roster(
+def merge_replica_rosters(
     first: Roster,
     aircraft: Sequence[tuple[str, Aircraft]],
     own: Sequence[tuple[str, Aircraft]] = (),
 ) -> Roster | None:
-    """Return the roster of all replicas, or None where they cannot have one.
+    """Return one roster for the aircraft of all replicas, or None where they differ in more than
+    radar cross-section and equipage.
 
     Radar cross-sections and equipage may differ: how far a sensor looks, and which physics it has,
     does not rest on them. Whatever else differs may decide how far a sensor looks. The `own` ones
@@ -347,10 +347,10 @@ def joint_roster(
     if len(aircraft) % width:
         return None
     alike = [
-        _is_same_aircraft(one, (first.names[number % width], first.aircraft[number % width]))
+        _is_equal_if_mergeable(one, (first.names[number % width], first.aircraft[number % width]))
         for number, one in enumerate(aircraft)
     ]
-    alike += [_is_same_aircraft(one, (first.own_name, first.own_aircraft[0])) for one in own]
+    alike += [_is_equal_if_mergeable(one, (first.own_name, first.own_aircraft[0])) for one in own]
     if None in alike:
         return None
     if all(alike):
@@ -359,11 +359,13 @@ def joint_roster(
     return Roster(first.names, tuple(craft for _, craft in aircraft), first.own_name, mine)
 
 
-def _is_same_aircraft(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
-    """Return whether an aircraft is the same as another's, None where no roster holds both."""
+def _is_equal_if_mergeable(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
+    """Return True for equal aircraft, False where they differ in `_MAY_DIFFER` fields only, None
+    where one roster cannot hold both.
+    """
     if one[0] != other[0]:
         return None
-    if _is_alike(one[1], other[1]):
+    if _has_equal_fields(one[1], other[1]):
         return True
     differing = (
         field

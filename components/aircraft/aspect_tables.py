@@ -62,7 +62,7 @@ class RcsTable:
     rcs_dbsm: FloatArray
 
     def __post_init__(self) -> None:
-        _check_grid(self, "rcs_dbsm")
+        _convert_and_check_grid(self, "rcs_dbsm")
 
     def dbsm(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the RCS in dBsm seen from a direction."""
@@ -76,7 +76,7 @@ class RcsTable:
     @staticmethod
     def from_rows(az_deg: ArrayLike, el_deg: ArrayLike, dbsm: ArrayLike) -> RcsTable:
         """Build a table from one row per node, in any order."""
-        return RcsTable(*_grid_of(az_deg, el_deg, dbsm, "dbsm"))
+        return RcsTable(*_grid_from_nodes(az_deg, el_deg, dbsm, "dbsm"))
 
     @staticmethod
     def from_csv(path: str | PathLike[str]) -> RcsTable:
@@ -102,7 +102,7 @@ class SilhouetteTable:
     area_m2: FloatArray
 
     def __post_init__(self) -> None:
-        _check_grid(self, "area_m2")
+        _convert_and_check_grid(self, "area_m2")
         azimuth, elevation = self.azimuth_deg, self.elevation_deg
         refuse("area_m2", self.area_m2, ~(self.area_m2 >= 0.0), "be 0 or more")
         if azimuth.size < 3:
@@ -112,8 +112,8 @@ class SilhouetteTable:
                 f"the table has a hole: its elevations run from {elevation[0]:g} to "
                 f"{elevation[-1]:g} degrees, they must reach from -90 to 90"
             )
-        _refuse_missing_nodes("az_deg", np.append(azimuth, azimuth[0] + 360.0), wraps=True)
-        _refuse_missing_nodes("el_deg", elevation, wraps=False)
+        _refuse_gap_in_nodes("az_deg", np.append(azimuth, azimuth[0] + 360.0), wraps=True)
+        _refuse_gap_in_nodes("el_deg", elevation, wraps=False)
 
     def area(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> Any:
         """Return the area in m² seen from a direction."""
@@ -131,7 +131,7 @@ def table_from_nodes(
     elevation, area = finite("elevation_deg", elevation_deg), finite("area_m2", area_m2)
     refuse("el_deg", elevation, ~(np.abs(elevation) <= 90.0), "be between -90 and 90")
     refuse("area_m2", area, ~(area >= 0.0), "be 0 or more")
-    azimuths, elevations, rows = _grid_of(azimuth_deg, elevation, area, "area_m2")
+    azimuths, elevations, rows = _grid_from_nodes(azimuth_deg, elevation, area, "area_m2")
     for row, el in zip(rows, elevations, strict=True):
         # From straight above every azimuth is the same direction: which node of an uneven row
         # were taken, the sign of a zero would decide.
@@ -182,8 +182,10 @@ def _interpolate(
     return unflatten(lower * (1.0 - up) + upper * up, shape)
 
 
-def _check_grid(table: Any, values: str) -> None:
-    """Keep the nodes and values of a table as arrays, and refuse those that are no grid."""
+def _convert_and_check_grid(table: Any, values: str) -> None:
+    """Convert the nodes and values of a table to arrays in place, and raise ValueError unless nodes
+    rise and the shape is (elevations, azimuths).
+    """
     for field in ("azimuth_deg", "elevation_deg", values):
         object.__setattr__(table, field, np.array(finite(field, getattr(table, field))))
     azimuth, elevation = table.azimuth_deg, table.elevation_deg
@@ -200,10 +202,12 @@ def _check_grid(table: Any, values: str) -> None:
         )
 
 
-def _grid_of(
+def _grid_from_nodes(
     az_deg: ArrayLike, el_deg: ArrayLike, values: ArrayLike, name: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return azimuths, elevations and the grid of values given node by node, in any order."""
+    """Return sorted azimuths, sorted elevations and values (elevations, azimuths) of nodes listed
+    in any order; raise ValueError for a hole.
+    """
     columns = [
         finite(column, given).reshape(-1)
         for column, given in (("az_deg", az_deg), ("el_deg", el_deg), (name, values))
@@ -243,7 +247,7 @@ def _read_nodes(
     rows: list[list[float]] = []
     columns: list[int] = []
     factor = 1.0
-    for number, cells in _rows(path):
+    for number, cells in _iterate_csv_rows(path):
         if not header:
             header = [cell.strip().lower() for cell in cells]
             value = next((name for name in values if name in header), None)
@@ -266,8 +270,8 @@ def _read_nodes(
     return nodes
 
 
-def _rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
-    """Yield the rows of a table that hold something but comments (#), with their lines from 1.
+def _iterate_csv_rows(path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
+    """Yield line number (from 1) and cells of each CSV row that is not empty or a comment (#).
 
     A cell never spans lines, so that a stray quote cannot swallow what follows it.
     """
@@ -293,7 +297,9 @@ def _row_values(
     columns: Sequence[int],
     quantities: Sequence[str],
 ) -> list[float]:
-    """Return the numbers of a row; the names of quantities end in their units."""
+    """Return the numbers in the given columns of a row; ValueError for one that is missing, no
+    number or absurdly large for its unit.
+    """
     values = []
     for column, quantity in zip(columns, quantities, strict=True):
         try:
@@ -311,8 +317,8 @@ def _row_values(
     return values
 
 
-def _refuse_missing_nodes(name: str, nodes: FloatArray, *, wraps: bool) -> None:
-    """Refuse a grid in which one step is much wider than the steps on both of its sides."""
+def _refuse_gap_in_nodes(name: str, nodes: FloatArray, *, wraps: bool) -> None:
+    """Raise ValueError where a step is much wider than both beside it, as if a node is missing."""
     steps = np.diff(nodes)
     if steps.size < 3:
         return

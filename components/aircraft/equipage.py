@@ -36,7 +36,7 @@ HEIGHT_ERROR_M = np.array([np.nan, 150.0, 45.0])
 _95_IN_DEVIATIONS = 1.959964
 
 
-def _address(given: str) -> str:
+def _check_icao_address(given: str) -> str:
     # All 0 and all 1 are nobody's (ICAO Annex 10 III, 9, appendix).
     if not re.fullmatch("[0-9A-Fa-f]{6}", given) or int(given, 16) in (0, 0xFFFFFF):
         raise ValueError("must be six hexadecimal digits, neither all 0 nor all F")
@@ -44,7 +44,7 @@ def _address(given: str) -> str:
 
 
 #: A 24-bit address as text.
-IcaoAddress = Annotated[str, AfterValidator(_address)]
+IcaoAddress = Annotated[str, AfterValidator(_check_icao_address)]
 
 
 class AdsBEquipage(Parameters):
@@ -114,7 +114,9 @@ class AdsBEquipage(Parameters):
 
 
 class EquipageShares(Parameters):
-    """Shares of a fleet that carry what its aircraft's table says; each by itself, by its name."""
+    """Shares (0 to 1) of a fleet's aircraft that keep the Mode S, Mode C and ADS-B of their type;
+    drawn for each aircraft by its name.
+    """
 
     mode_s: float = Field(
         default=1.0,
@@ -163,12 +165,12 @@ class Equipage:
 
     @property
     def height_deviation_m(self) -> FloatArray:
-        """Standard deviation of geometric heights, m; NaN of who sends none."""
+        """Standard deviation of broadcast geometric heights, m; NaN where none are broadcast."""
         return np.asarray(HEIGHT_ERROR_M[self.gva] / _95_IN_DEVIATIONS)
 
     @property
-    def late_s(self) -> FloatArray:
-        """Return by how many seconds sent positions are late: their latency not compensated."""
+    def uncompensated_latency_s(self) -> FloatArray:
+        """Seconds by which broadcast positions are late: their latency less its compensation."""
         return self.latency_s - self.compensated_s
 
     @classmethod
@@ -182,14 +184,14 @@ class Equipage:
         def column(read: Callable[[Any], Any], kind: type) -> AnyArray:
             return np.array([read(one) for one in kinds.values()], dtype=kind)[index]
 
-        def sent(name: str, otherwise: float, kind: type) -> AnyArray:
+        def ads_b_column(name: str, otherwise: float, kind: type) -> AnyArray:
             def value(one: Any) -> Any:
                 given = getattr(one.ads_b, name, None)
                 return otherwise if given is None else given
 
             return column(value, kind)
 
-        nacp, nic = sent("nacp", 0, int), sent("nic", 0, int)
+        nacp, nic = ads_b_column("nacp", 0, int), ads_b_column("nic", 0, int)
         own = column(lambda one: int(one.icao_address or "0", 16), int)
         drawn = (keys & np.uint64(0xFFFFFF)).astype(np.int64)
         return cls(
@@ -197,13 +199,15 @@ class Equipage:
             column(lambda one: one.mode_c, bool),
             column(lambda one: one.ads_b is not None, bool),
             nacp,
-            sent("nacv", 0, int),
+            ads_b_column("nacv", 0, int),
             np.where(nic == 0, nacp, nic),
-            sent("latency_s", 0.0, float),
-            sent("compensated_s", 0.0, float),
-            sent("silent_after_s", np.inf, float),
-            np.stack([sent(f"spoofed_{axis}_m", 0.0, float) for axis in ("north", "east", "up")]),
-            sent("gva", 0, int),
+            ads_b_column("latency_s", 0.0, float),
+            ads_b_column("compensated_s", 0.0, float),
+            ads_b_column("silent_after_s", np.inf, float),
+            np.stack(
+                [ads_b_column(f"spoofed_{axis}_m", 0.0, float) for axis in ("north", "east", "up")]
+            ),
+            ads_b_column("gva", 0, int),
             np.where(own == 0, drawn, own),
         )
 
@@ -211,7 +215,9 @@ class Equipage:
 def draw_equipage(
     names: Sequence[str], aircraft: Sequence[Any], shares: EquipageShares, stream: Any
 ) -> list[Any]:
-    """Return aircraft of which only the shares keep their equipage, drawn by their names."""
+    """Return copies of the aircraft that keep Mode S, Mode C and ADS-B each with the probability of
+    its share, drawn by their names.
+    """
     keys, of_kind = target_keys(tuple(names)), dict[Any, Any]()
     kept = [
         stream.uniform(keys, np.int64(0), draw) < share

@@ -8,7 +8,7 @@ from dsa_des.block.component import Context
 
 
 class KnownTraffic:
-    """What a traffic block offers: what the targets are of who looks, and where they can be.
+    """What a block offers before a run: targets as a viewer sees them, and where they can be.
 
     Two offers are equal when their targets are and it was not asked where these can be. `envelope`
     gives, for a reach in m, the time in s that a look lasts and who looks (a target, or -1), the
@@ -28,7 +28,7 @@ class KnownTraffic:
         self._views: dict[int, KnownTraffic] = {}
 
     def seen_from(self, platform: str) -> "KnownTraffic":
-        """Return the offer of targets as a viewer on one platform sees them."""
+        """Return the offer for a viewer aboard this platform, which its roster has as ownship."""
         if platform == self.roster.own_name:
             return self
         target = self.roster.names.index(platform)
@@ -38,12 +38,14 @@ class KnownTraffic:
         return self._views[target]
 
     @property
-    def was_asked(self) -> bool:
-        """Return whether a block has used where the targets can be."""
-        return self._asked or any(view.was_asked for view in self._views.values())
+    def is_envelope_used(self) -> bool:
+        """Return whether any block has asked this offer, or a view of it, for the envelope."""
+        return self._asked or any(view.is_envelope_used for view in self._views.values())
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
-        """Return the run's envelope for a reach, or None."""
+        """Return bounds on where targets can be, for a reach in m and looks that last `lasts_s`;
+        None where they are not known in advance.
+        """
         if self._envelope is None:  # of no replica
             return None
         self._asked = True
@@ -53,15 +55,15 @@ class KnownTraffic:
         return self is other or (
             isinstance(other, KnownTraffic)
             and self.roster == other.roster
-            and not (self.was_asked or other.was_asked)
+            and not (self.is_envelope_used or other.is_envelope_used)
         )
 
     def __hash__(self) -> int:
         return hash(self.roster)
 
 
-def known_targets(context: Context) -> tuple[Roster, ...]:
-    """Return the rosters that a block's producers offer it; none where targets may be anything.
+def offered_rosters(context: Context) -> tuple[Roster, ...]:
+    """Return the rosters that a block's producers offer; empty if targets are not known ahead.
 
     A traffic block offers its roster, alone or as `KnownTraffic`; the transform and the gate pass
     on what they were offered.

@@ -50,11 +50,11 @@ class AlerterKeys:
         #: Alerters that the file holds and `alerters` does not name: they are ignored.
         self.left_out: tuple[str, ...] = ()
 
-    def alerters(self) -> tuple[Alerter, ...]:
-        """Return all alerters in the order in which the key ``alerters`` names them."""
+    def read_alerters(self) -> tuple[Alerter, ...]:
+        """Return all alerters in the order of key ``alerters``; collect their keys' problems."""
         if "alerters" not in self._lines:
             self._problems.add("there is no key 'alerters': it names at least one alerter")
-            self._note_unknown()
+            self._note_unknown_keys()
             return ()
         number, _, text = self._lines["alerters"]
         names = [name.strip() for name in text.split(",") if name.strip()]
@@ -65,14 +65,16 @@ class AlerterKeys:
         # The longest name first: one may be the beginning of another.
         prefixes = {name: name.lower() + "_" for name in sorted(names, key=len, reverse=True)}
         self._beginnings = {prefix: name + "_" for name, prefix in prefixes.items()}
-        result = {name: self._alerter(name, prefix, number) for name, prefix in prefixes.items()}
-        self._ignore_alerters(tuple(prefixes.values()))
+        result = {
+            name: self._read_alerter(name, prefix, number) for name, prefix in prefixes.items()
+        }
+        self._ignore_alerters_except(tuple(prefixes.values()))
         for name, prefix in prefixes.items():
             self._note_idle_detectors(name, prefix)
-        self._note_unknown()
+        self._note_unknown_keys()
         return tuple(alerter for name in names if (alerter := result[name]) is not None)
 
-    def _alerter(self, name: str, prefix: str, named_in: int) -> Alerter | None:
+    def _read_alerter(self, name: str, prefix: str, named_in: int) -> Alerter | None:
         of_level: dict[int, set[str]] = {}
         for key in self._lines:
             match = _LEVEL.fullmatch(key[len(prefix) :]) if key.startswith(prefix) else None
@@ -82,7 +84,7 @@ class AlerterKeys:
         if not of_level:
             self._problems.add(
                 f"the alerter {shorten(name)!r} has no levels: {name}_alert_1_detector and "
-                f"others are needed{did_you_mean(name, self._other_alerters(prefix))}",
+                f"others are needed{did_you_mean(name, self._alerter_names_except(prefix))}",
                 line=named_in,
             )
             return None
@@ -94,18 +96,20 @@ class AlerterKeys:
                     line=named_in,
                 )
                 return None
-            levels.append(self._level(name, prefix, number))
+            levels.append(self._read_level(name, prefix, number))
         return Alerter(name, tuple(level for level in levels if level is not None))
 
-    def _level(self, name: str, prefix: str, number: int) -> Level | None:
+    def _read_level(self, name: str, prefix: str, number: int) -> Level | None:
         begin = f"{prefix}alert_{number}_"
         values: dict[str, Any] = {}
         for key, kind in LEVEL_KEYS.items():
             needed = key in ("region", "detector", "alerting_time")
-            values[key] = self._value(begin + key, kind, needed, f"{name}_alert_{number}_{key}")
+            values[key] = self._read_value(
+                begin + key, kind, needed, f"{name}_alert_{number}_{key}"
+            )
         if values["detector"] is None:
             return None
-        volume = self._volume(name, prefix, str(values["detector"]), begin + "detector")
+        volume = self._read_volume(name, prefix, str(values["detector"]), begin + "detector")
         if volume is None or values["region"] is None or values["alerting_time"] is None:
             return None
         early_s = values["early_alerting_time"]
@@ -119,10 +123,12 @@ class AlerterKeys:
             tuple((key.removeprefix("spread_"), values[key]) for key in _SPREADS if values[key]),
         )
 
-    def _volume(
+    def _read_volume(
         self, name: str, prefix: str, detector: str, named_by: str
     ) -> tuple[Volume | TcasAdvisory, bool] | None:
-        """Return the volume of a detector and whether bounds on the states count."""
+        """Return the volume (or TCAS advisory) of a detector and whether errors of the states
+        enlarge it; None after adding a problem.
+        """
         key = f"{prefix}{_CLASS}{detector.lower()}"
         begin = f"{prefix}{detector.lower()}_"
         self._expected[key] = f"{name}_{_CLASS}{detector}"
@@ -160,11 +166,11 @@ class AlerterKeys:
             self._used |= {k for k in self._lines if k.startswith(begin)}
             return None
         if class_name == TCAS_CLASS:
-            advisory = self._advisory(f"{name}_{detector}", begin, number)
+            advisory = self._read_advisory(f"{name}_{detector}", begin, number)
             return None if advisory is None else (advisory, False)
         keys = CYLINDER_KEYS if class_name == CYLINDER_CLASS else VOLUME_KEYS
         sizes = {
-            size: self._value(
+            size: self._read_value(
                 begin + size.lower(), kind, size != "WCV_TCOA", f"{name}_{detector}_{size}"
             )
             for size, kind in keys.items()
@@ -182,10 +188,10 @@ class AlerterKeys:
         made = Volume(radius_m, half_m, times_s[0], times_s[1], CLASSES[class_name])
         return made, class_name.endswith("_SUM")
 
-    def _advisory(self, name: str, begin: str, line: int) -> TcasAdvisory | None:
+    def _read_advisory(self, name: str, begin: str, line: int) -> TcasAdvisory | None:
         """Return an advisory of TCAS II; a table that is written out must be the known one."""
         ((which, kind),) = TCAS_KEYS.items()
-        given = self._value(begin + which.lower(), kind, False, f"{name}_{which}")
+        given = self._read_value(begin + which.lower(), kind, False, f"{name}_{which}")
         table, bad = TableKeys(), False
         start = begin + "tcas_"
         for key in [key for key in self._lines if key.startswith(start)]:
@@ -213,8 +219,8 @@ class AlerterKeys:
             return None
         return TcasAdvisory(resolution)
 
-    def _value(self, key: str, kind: str, needed: bool, shown: str) -> Any:
-        """Return a value, or None where it is missing or wrong."""
+    def _read_value(self, key: str, kind: str, needed: bool, shown: str) -> Any:
+        """Return a key's value; None if missing or wrong, which becomes a problem if it matters."""
         self._expected[key] = shown
         if key not in self._lines:
             if needed:
@@ -228,8 +234,8 @@ class AlerterKeys:
             self._problems.add(f"{name} {error}", line=number)
             return None
 
-    def _ignore_alerters(self, named: tuple[str, ...]) -> None:
-        """Ignore the keys of whole alerters other than those with the prefixes `named`."""
+    def _ignore_alerters_except(self, named: tuple[str, ...]) -> None:
+        """Mark the keys of all alerters as ignored except those `named`, whose keys are read."""
         free = self._lines.keys() - self._used
         result: dict[str, str] = {}
         for key in free:
@@ -244,8 +250,8 @@ class AlerterKeys:
             self._used |= {k for k in free if k.startswith(prefix) and not k.startswith(longer)}
         self.left_out = tuple(sorted(result.values()))
 
-    def _other_alerters(self, prefix: str) -> list[str]:
-        """Return the names of what looks like alerters but those with a prefix."""
+    def _alerter_names_except(self, prefix: str) -> list[str]:
+        """Return the names of all alerters the file seems to describe, without this prefix's."""
         found = {
             self._lines[key][1][: match.end(1)]
             for key in self._lines
@@ -254,7 +260,7 @@ class AlerterKeys:
         return [name for name in found if name.lower() + "_" != prefix]
 
     def _note_idle_detectors(self, name: str, prefix: str) -> None:
-        """Add a note on each detector that no level uses, unless its name is misspelt."""
+        """Add a problem for each detector of an alerter that no level names."""
         start = prefix + _CLASS
         for key in sorted(self._lines.keys() - self._used):
             if not key.startswith(start):
@@ -269,8 +275,8 @@ class AlerterKeys:
                     line=number,
                 )
 
-    def _note_unknown(self) -> None:
-        """Add a note on unknown keys: one for each that is like a known key, one for all others."""
+    def _note_unknown_keys(self) -> None:
+        """Add a problem for each unknown key that resembles a known one, and one for all others."""
         strange = []
         for key in sorted(self._lines.keys() - self._used, key=lambda key: self._lines[key][0]):
             number, name, _ = self._lines[key]
@@ -287,7 +293,7 @@ class AlerterKeys:
             self._problems.add(f"{len(strange)} keys are unknown: {names}")
 
     def _nearest_key(self, key: str) -> str | None:
-        """Return the key that a misspelt one stands for, of those that the file lacks."""
+        """Return the missing known key most like a misspelt one; None if none is close."""
         free = {k: shown for k, shown in self._expected.items() if k not in self._lines}
         for begin in sorted(self._beginnings, key=len, reverse=True):
             if key.startswith(begin):

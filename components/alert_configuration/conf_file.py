@@ -16,7 +16,7 @@ from components.alert_configuration.conf_keys import (
 )
 from components.alert_configuration.configuration import Configuration
 from components.formats.text_rows import MOST_OF_A_CELL, Problems, read_lines
-from dsa_des.block.shipped_files import resolve_shipped
+from dsa_des.block.shipped_files import existing_or_shipped_path
 from dsa_des.text.safe_text import shorten
 
 #: A file of DAIDALUS 1 has one alerter, without a name, and says track and ground speed.
@@ -29,7 +29,7 @@ _MOST_PROBLEMS = 1000
 
 
 def read_conf(path: str | PathLike[str]) -> Configuration:
-    """Read a configuration.
+    """Return a DAIDALUS file's configuration, or raise one error with all problems of the file.
 
     Parameters
     ----------
@@ -45,20 +45,20 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     TrafficFileError
         With all problems of the file: line, key, value, what is allowed.
     """
-    path = resolve_shipped(Path(path), str(path))
+    path = existing_or_shipped_path(Path(path), str(path))
     problems = Problems(str(path), most=_MOST_PROBLEMS)
-    lines = _lines(path, problems)
-    _refuse_release_1(lines, path)
-    values, units = _values(lines, problems)
+    lines = _read_lines_by_key(path, problems)
+    _refuse_daidalus_1(lines, path)
+    values, units = _read_common_values(lines, problems)
     keys = AlerterKeys(lines, problems)
-    alerters = keys.alerters()
-    _check_together(values, lines, problems)
+    alerters = keys.read_alerters()
+    _check_contradictions(values, lines, problems)
     problems.raise_if_any()
     return Configuration(alerters, values, units, keys.left_out)
 
 
-def _refuse_release_1(lines: Lines, path: Path) -> None:
-    """Refuse a file of DAIDALUS 1 by one error, without a word on its keys."""
+def _refuse_daidalus_1(lines: Lines, path: Path) -> None:
+    """Raise an error if the file is a configuration of DAIDALUS 1, whose keys are not read."""
     old = [name for key, (_, name, _) in lines.items() if _OF_RELEASE_1.fullmatch(key)]
     if old and "alerters" not in lines:
         problems = Problems(str(path))
@@ -79,8 +79,8 @@ def default_values() -> tuple[dict[str, Any], dict[str, str]]:
     return values, {key: unit for key, (_, _, unit) in KEYS.items() if unit}
 
 
-def _lines(path: Path, problems: Problems) -> Lines:
-    """Return line number, key as written and text of the value by key in lower case."""
+def _read_lines_by_key(path: Path, problems: Problems) -> Lines:
+    """Return every line's number, key as written and value's text, by key in lower case."""
     result: Lines = {}
     for number, line in read_lines(path, problems, "a text file", "lines key = value [unit]"):
         text = line.split("#", 1)[0].strip()
@@ -96,8 +96,8 @@ def _lines(path: Path, problems: Problems) -> Lines:
     return result
 
 
-def _values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str, str]]:
-    """Read the keys that belong to no alerter."""
+def _read_common_values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return values and units, by key, of keys that belong to no alerter; defaults if missing."""
     values, units = default_values()
     for key, (kind, default, _) in KEYS.items():
         if key not in lines:
@@ -130,26 +130,26 @@ def _values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str,
     return values, units
 
 
-def _check_together(values: dict[str, Any], lines: Lines, problems: Problems) -> None:
+def _check_contradictions(values: dict[str, Any], lines: Lines, problems: Problems) -> None:
     """Add a problem for each pair of values that contradict each other."""
 
-    def at(key: str) -> int | None:
+    def line_of(key: str) -> int | None:
         return lines[key][0] if key in lines else None
 
     for low, high in (("min_hs", "max_hs"), ("min_vs", "max_vs"), ("min_alt", "max_alt")):
         if values[low] >= values[high]:
-            problems.add(f"{low} must lie below {high}", line=at(low) or at(high))
+            problems.add(f"{low} must lie below {high}", line=line_of(low) or line_of(high))
     for key in ("step_hdir", "step_hs", "step_vs", "step_alt", "lookahead_time"):
         if values[key] == 0.0:
-            problems.add(f"{key} is 0: it must be above 0", line=at(key))
+            problems.add(f"{key} is 0: it must be above 0", line=line_of(key))
     if values["alerting_m"] > values["alerting_n"]:
         problems.add(
             f"alerting_m is {values['alerting_m']}: it must be at most alerting_n, "
             f"{values['alerting_n']}",
-            line=at("alerting_m"),
+            line=line_of("alerting_m"),
         )
     if not 0.0 < values["ca_factor"] < 1.0:
         problems.add(
             f"ca_factor is {values['ca_factor']:g}: it must lie between 0 and 1",
-            line=at("ca_factor"),
+            line=line_of("ca_factor"),
         )

@@ -147,7 +147,7 @@ class BadValue(ValueError):
 
 
 def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, str]:
-    """Return a value and the unit it is written in."""
+    """Return a text's value, in SI units or as its kind demands, and its unit, empty for none."""
     match = _VALUE.fullmatch(text.strip())
     if match is None:
         raise BadValue(f"{shorten(text, 40)!r} is not a value with its unit in brackets")
@@ -155,13 +155,13 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
     if not plain:
         raise BadValue("has no value")
     if kind in UNITS:
-        return _quantity(kind, plain, unit, negative)
+        return _parse_quantity(kind, plain, unit, negative)
     if unit not in NO_UNIT:
         raise BadValue(f"has the unit [{shorten(unit, 20)}]: it takes none")
     if kind == "name":
         return plain, ""
     if kind == "region":
-        return _region(plain), ""
+        return _parse_region(plain), ""
     if kind == "version":
         plain = plain.strip("\"'")
         if plain not in (*VERSIONS, *VERSIONS_BETWEEN):
@@ -178,7 +178,7 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
         if result is None:
             raise BadValue(f"is {shorten(plain, 40)!r}: it must be true or false")
         return result, ""
-    value = _number(plain, negative)
+    value = _parse_number(plain, negative)
     if kind == "count":
         if value != int(value):
             raise BadValue(f"is {plain}: a whole number is needed")
@@ -186,9 +186,9 @@ def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, s
     return value, ""
 
 
-def _quantity(kind: str, plain: str, unit: str, negative: bool) -> tuple[float, str]:
+def _parse_quantity(kind: str, plain: str, unit: str, negative: bool) -> tuple[float, str]:
     factors = UNITS[kind]
-    value = _number(plain, negative)
+    value = _parse_number(plain, negative)
     shown = ", ".join(factors)
     if unit in NO_UNIT:
         raise BadValue(f"has no unit: it needs one in brackets, of {shown}")
@@ -199,7 +199,7 @@ def _quantity(kind: str, plain: str, unit: str, negative: bool) -> tuple[float, 
     return value * factors[unit], unit
 
 
-def _region(plain: str) -> str:
+def _parse_region(plain: str) -> str:
     allowed = REGIONS[:4]
     if plain.upper() not in allowed:
         close = nearest_name(plain, allowed)
@@ -208,7 +208,7 @@ def _region(plain: str) -> str:
     return plain.upper()
 
 
-def _number(plain: str, negative: bool) -> float:
+def _parse_number(plain: str, negative: bool) -> float:
     try:
         if "_" in plain:  # which float() takes and the format does not
             raise ValueError(plain)

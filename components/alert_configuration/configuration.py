@@ -76,11 +76,11 @@ class Configuration:
 
     @property
     def most_levels(self) -> int:
-        """Most levels of an alerter."""
+        """Largest number of levels that an alerter of the configuration has."""
         return max(len(alerter.levels) for alerter in self.alerters)
 
     def corrective_level(self, alerter: Alerter) -> Level | None:
-        """Return the first level whose region is at least the corrective one."""
+        """Return an alerter's first level whose region is at least corrective; None without one."""
         least = REGIONS.index(self["corrective_region"])
         for level in alerter.levels:
             if REGIONS.index(level.region) >= least:
@@ -97,8 +97,12 @@ class Deviations(NamedTuple):
     climb_mps: FloatArray
 
 
-def margins(configuration: Configuration, deviations: Deviations, range_m: FloatArray) -> Bounds:
-    """Return how far relative states may be wrong."""
+def uncertainty_bounds(
+    configuration: Configuration, deviations: Deviations, range_m: FloatArray
+) -> Bounds:
+    """Return how far relative states may be wrong: deviations times z-scores, where the one of
+    velocity falls with distance.
+    """
     position = configuration["h_pos_z_score"] * deviations.position_m
     least, most = configuration["h_vel_z_score_min"], configuration["h_vel_z_score_max"]
     distance_m = configuration["h_vel_z_distance"]
@@ -112,7 +116,9 @@ def margins(configuration: Configuration, deviations: Deviations, range_m: Float
     )
 
 
-def largest(east: FloatArray, north: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the standard deviation along the longest axis of 2 by 2 covariances."""
+def longest_axis_deviation(
+    east: FloatArray, north: FloatArray, covariance: FloatArray
+) -> FloatArray:
+    """Return an error ellipse's largest standard deviation, from east, north and covariance."""
     mean, half = 0.5 * (east**2 + north**2), 0.5 * (east**2 - north**2)
     return np.asarray(np.sqrt(mean + np.hypot(half, covariance)))

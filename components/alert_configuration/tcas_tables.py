@@ -29,7 +29,9 @@ _FIELDS: dict[str, Callable[[Thresholds], float]] = {
 
 
 class TableKeys:
-    """The keys of one detector that write out a table: a filter, levels' tops, and their sizes."""
+    """Collects the keys by which a file writes out the table of a TCAS detector: miss-distance
+    filter, altitude levels and sizes.
+    """
 
     def __init__(self) -> None:
         self._filter: tuple[str, bool] | None = None
@@ -37,7 +39,7 @@ class TableKeys:
         self._sizes: list[tuple[str, str, int, float]] = []
 
     def read_key(self, key: str, shown: str, text: str) -> bool:
-        """Store the value of a table's key and return True, False for other keys; or `BadValue`."""
+        """Store the value of a TCAS table's key and return True; return False for any other key."""
         match = _KEY.fullmatch(key)
         if match is None:
             return False
@@ -53,7 +55,7 @@ class TableKeys:
         return True
 
     def differences(self, resolution: bool) -> list[str]:
-        """Return which keys say something else than the known table."""
+        """Return the keys whose values differ from the known TCAS II table, RA or TA."""
         result = [
             shown
             for (_, (shown, value)), top_m in zip(

@@ -32,10 +32,10 @@ def draw_alerts(
     with draw_to_png(9.0, 7.5, path) as figure:
         grid = figure.add_gridspec(3, 2, width_ratios=(1.25, 1.0))
         over_time = figure.add_subplot(grid[0, 0])
-        _levels(over_time, configuration, encounter, alerts)
-        _times(figure.add_subplot(grid[1, 0], sharex=over_time), encounter, alerts)
+        _draw_levels(over_time, configuration, encounter, alerts)
+        _draw_violation_times(figure.add_subplot(grid[1, 0], sharex=over_time), encounter, alerts)
         bands = bands_over_time("hdir", configuration, encounter, alerts)
-        _bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
+        _draw_direction_bands(figure.add_subplot(grid[2, 0], sharex=over_time), encounter, bands)
         _draw_plan(figure.add_subplot(grid[:, 1]), configuration, encounter, alerts)
         figure.suptitle(figure_text(title))
         fit_axes_to_texts(figure)
@@ -45,7 +45,9 @@ def _seconds_since_start(encounter: Encounter) -> Any:
     return encounter.time_s - encounter.time_s[0]
 
 
-def _levels(axes: Any, configuration: Configuration, encounter: Encounter, alerts: Alerts) -> None:
+def _draw_levels(
+    axes: Any, configuration: Configuration, encounter: Encounter, alerts: Alerts
+) -> None:
     """Draw each target's alert level as steps."""
     for number, target in enumerate(encounter.targets):
         level = np.where(encounter.present[:, number], alerts.level[:, number], np.nan)
@@ -58,8 +60,8 @@ def _levels(axes: Any, configuration: Configuration, encounter: Encounter, alert
     _put_legend_above(axes)
 
 
-def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
-    """Draw the time to the volume of each level, of the target that is nearest to it."""
+def _draw_violation_times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
+    """Draw for each level the least time to violation over all targets, against time."""
     least = np.min(
         np.where(encounter.present[:, :, np.newaxis], alerts.violation_s, np.inf), axis=1
     )
@@ -67,7 +69,7 @@ def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
         axes.plot(
             _seconds_since_start(encounter),
             np.where(np.isfinite(least[:, number]), least[:, number], np.nan),
-            color=_colour(number + 1),
+            color=_level_colour(number + 1),
             linestyle=_STYLES[number % len(_STYLES)],
             linewidth=2.4 - 0.5 * min(number, 3),
             label=f"level {number + 1}",
@@ -78,7 +80,7 @@ def _times(axes: Any, encounter: Encounter, alerts: Alerts) -> None:
     _put_legend_above(axes)
 
 
-def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
+def _draw_direction_bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
     """Draw the bands of direction over time, and the direction that is flown."""
     time_s = found.time_s - encounter.time_s[0]
     step_s = float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
@@ -95,7 +97,7 @@ def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
                 )
     for region, corners in stretches.items():
         if corners:
-            _fill(axes, corners, _REGIONS[region], region)
+            _fill_rectangles(axes, corners, _REGIONS[region], region)
     axes.plot(time_s, np.degrees(found.own_value), "k.", markersize=1.5, label="flown")
     axes.set_xlim(0.0, max(float(ends_s[-1]), 1e-3))
     axes.set_ylim(0.0, 360.0)
@@ -106,8 +108,8 @@ def _bands(axes: Any, encounter: Encounter, found: BandsOverTime) -> None:
     _put_legend_above(axes)
 
 
-def _fill(axes: Any, corners: list[Any], colour: str, label: str) -> None:
-    """Fill rectangles without seams between those that touch."""
+def _fill_rectangles(axes: Any, corners: list[Any], colour: str, label: str) -> None:
+    """Fill rectangles, given by corners, in one colour without seams between adjacent ones."""
     from matplotlib.collections import PolyCollection
 
     axes.add_collection(
@@ -137,7 +139,9 @@ def _draw_plan(
     for level in range(1, int(highest.max(initial=0)) + 1):
         at = highest == level
         if at.any():
-            axes.plot(*own[:, at], ".", color=_colour(level), markersize=4, label=f"level {level}")
+            axes.plot(
+                *own[:, at], ".", color=_level_colour(level), markersize=4, label=f"level {level}"
+            )
     for number, target in enumerate(encounter.targets):
         there = encounter.present[:, number]
         plane = np.where(there, encounter.target_plane[:, :, number], np.nan) / NAUTICAL_MILE_M
@@ -146,7 +150,7 @@ def _draw_plan(
         if there.any():
             axes.plot(*plane[:, np.argmax(there)], "o", color="black", markersize=3)
     axes.plot(*own[:, 0], "o", color="black", markersize=3)
-    _volume(axes, configuration, encounter)
+    _draw_corrective_volume(axes, configuration, encounter)
     axes.set_aspect("equal", adjustable="datalim")
     axes.set_xlabel("east, nmi")
     axes.set_ylabel("north, nmi")
@@ -156,7 +160,7 @@ def _draw_plan(
     )
 
 
-def _volume(axes: Any, configuration: Configuration, encounter: Encounter) -> None:
+def _draw_corrective_volume(axes: Any, configuration: Configuration, encounter: Encounter) -> None:
     """Draw the radius of the corrective volume around the ownship at the closest approach."""
     if not encounter.present.any():
         return
@@ -174,5 +178,5 @@ def _volume(axes: Any, configuration: Configuration, encounter: Encounter) -> No
     axes.plot(east + radius * np.sin(turn), north + radius * np.cos(turn), "k:", linewidth=1.0)
 
 
-def _colour(level: int) -> str:
+def _level_colour(level: int) -> str:
     return _COLOURS[min(level, len(_COLOURS) - 1)]

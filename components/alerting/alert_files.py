@@ -15,12 +15,12 @@ from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.formats.recorded.traffic_of_files import TrafficChoice
 from components.formats.text_rows import SPEED_MPS, TrafficFileError
-from dsa_des.block.shipped_files import resolve_shipped
+from dsa_des.block.shipped_files import existing_or_shipped_path
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
-from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
+from dsa_des.files.output_file import PICTURES, check_file_ending, check_file_writable, write_file
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.output_names import reason_of, user_path
+from dsa_des.files.output_names import system_error_text, user_path
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 
@@ -29,14 +29,14 @@ _OTHER_PROBLEMS = 5
 
 
 class _Done(NamedTuple):
-    """An encounter and its alerts."""
+    """One encounter file, what was read from it, and its alerts."""
 
     path: Path
     encounter: Encounter
     alerts: Alerts
 
 
-def alert_files(
+def write_alert_files(
     encounters: tuple[str, ...],
     conf: str,
     out: str,
@@ -60,34 +60,36 @@ def alert_files(
             OutputFolder(path).check()
         else:
             if option == "--figure":
-                check_ending(path, PICTURES, option)
-            check_file(path, option)
+                check_file_ending(path, PICTURES, option)
+            check_file_writable(path, option)
     configuration = _read_configuration(Path(conf))
     if no_hysteresis:
         configuration = remove_hysteresis(configuration)
     own = None if own_file is None else Path(own_file)
     choice = TrafficChoice(ownship=ownship, own_file=own)
-    done = _alerts(configuration, paths, _wind_mps(wind), choice)
+    done = _compute_alerts(configuration, paths, _wind_mps(wind), choice)
     try:
         if several:
             _write_folders(configuration, done, places, decimals)
         else:
             for option, path in places.items():
-                _write(option, configuration, done[0], path, decimals)
+                _write_output(option, configuration, done[0], path, decimals)
     except OSError as error:
-        raise OutputError(f"{error.filename or out}: cannot be written: {reason_of(error)}") from (
-            error
-        )
-    _show(configuration, done, places)
+        raise OutputError(
+            f"{error.filename or out}: cannot be written: {system_error_text(error)}"
+        ) from (error)
+    _print_summary(configuration, done, places)
 
 
 def _list_encounter_files(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
-    """Return the files that are named, those of folders sorted, and whether they may be several."""
+    """Return the encounter files that are named or lie in named folders, and whether outputs must
+    be folders as there may be several.
+    """
     result: list[Path] = []
     several = len(encounters) > 1
     for text in encounters:
         try:
-            path = resolve_shipped(resolve_home(text), text)
+            path = existing_or_shipped_path(resolve_home(text), text)
         except InputFileError as error:
             raise UsageError(f"{text}: {error}") from error
         if not is_folder(path):
@@ -113,13 +115,13 @@ def _read_configuration(path: Path) -> Configuration:
         raise UsageError(*str(error).split("\n")) from error
 
 
-def _alerts(
+def _compute_alerts(
     configuration: Configuration,
     paths: list[Path],
     wind_mps: tuple[float, float] | None,
     choice: TrafficChoice,
 ) -> list[_Done]:
-    """Return the alerts of all files, or one error about all that cannot be used."""
+    """Return the alerts of all files; one UsageError for all files that cannot be used."""
     done, problems = [], []
     for path in paths:
         try:
@@ -144,7 +146,7 @@ def _alerts(
 
 
 def _wind_mps(wind: tuple[float, float] | None) -> tuple[float, float] | None:
-    """Return the wind that the command line sets, towards the east and north."""
+    """Return the command line's wind as velocity east and north, m/s; None where it is not set."""
     if wind is None:
         return None
     towards_deg, knots = wind
@@ -162,13 +164,13 @@ def _write_folders(
 ) -> None:
     for option, target in places.items():
         suffix = ".png" if option == "--figure" else ".csv"
-        with OutputFolder(target).writing() as folder:
+        with OutputFolder(target).write_then_rename() as folder:
             for one in done:
                 path = folder / f"{one.path.stem}{suffix}"
-                _write(option, configuration, one, path, decimals)
+                _write_output(option, configuration, one, path, decimals)
 
 
-def _write(
+def _write_output(
     option: str, configuration: Configuration, one: _Done, path: Path, decimals: int
 ) -> None:
     if option == "--figure":
@@ -178,8 +180,10 @@ def _write(
     write_file(path, table(configuration, one.encounter, one.alerts, decimals).encode())
 
 
-def _show(configuration: Configuration, done: list[_Done], places: dict[str, Path]) -> None:
-    """Print when each level first comes on."""
+def _print_summary(
+    configuration: Configuration, done: list[_Done], places: dict[str, Path]
+) -> None:
+    """Print a table of when each level first comes on by target, then notes and files written."""
     levels = range(1, configuration.most_levels + 1)
     rows = []
     for one in done:

@@ -49,7 +49,7 @@ def alert_table(
     configuration: Configuration, encounter: Encounter, alerts: Alerts, decimals: int = DECIMALS
 ) -> str:
     """Return the table of an encounter as comma-separated text with two rows of headings."""
-    units = _units(configuration)
+    units = _table_units(configuration)
     shown = _separation_columns(configuration)
     names = ["Time", "Ownship", "Traffic", "Alerter", "Alert Level"]
     heading_units = ["[s]", "", "", "", ""]
@@ -61,12 +61,14 @@ def alert_table(
         heading_units.append(f" [{units[kind][0]}]")
     lines = [" " + ", ".join(names), ",".join(heading_units)]
     row, column = np.nonzero(encounter.present)
-    lines += _rows(configuration, encounter, alerts, row, column, decimals)
+    lines += _table_rows(configuration, encounter, alerts, row, column, decimals)
     return "\n".join(lines) + "\n"
 
 
-def _units(configuration: Configuration) -> dict[str, tuple[str, float]]:
-    """Return unit and factor to SI by kind of quantity: those of recovery sizes and steps."""
+def _table_units(configuration: Configuration) -> dict[str, tuple[str, float]]:
+    """Return the unit's name and its factor to SI for each kind of quantity in a table, as the
+    configuration gives its recovery sizes and steps.
+    """
     result = {"time": ("s", 1.0)}
     for kind, key, factors in (
         ("horizontal", "min_horizontal_recovery", LENGTH_M),
@@ -80,13 +82,15 @@ def _units(configuration: Configuration) -> dict[str, tuple[str, float]]:
 
 
 def _separation_columns(configuration: Configuration) -> tuple[tuple[str, str, str], ...]:
-    """Return the columns of separation: without modified tau where the first alerter has none."""
+    """Return name, key and kind of the columns on separation; modified tau is left out where the
+    first alerter uses a TCAS advisory.
+    """
     first = configuration.corrective_level(configuration.alerters[0])
     advisory = first is not None and isinstance(first.volume, TcasAdvisory)
     return _SEPARATION[:-1] if advisory else _SEPARATION
 
 
-def _rows(
+def _table_rows(
     configuration: Configuration,
     encounter: Encounter,
     alerts: Alerts,
@@ -112,14 +116,14 @@ def _rows(
     ]
     for number in range(configuration.most_levels):
         texts.append(number_texts(alerts.violation_s[cells][:, number], decimals))
-    units = _units(configuration)
+    units = _table_units(configuration)
     for _, key, kind in _separation_columns(configuration):
         texts.append(number_texts(result[key] / units[kind][1], decimals))
     return [", ".join(parts) for parts in zip(*texts, strict=True)]
 
 
 def number_texts(values: FloatArray, decimals: int) -> list[str]:
-    """Return numbers as text: rounded, without trailing zeros; infinite ones as ``infty``."""
+    """Return numbers as texts, rounded, without trailing zeros; NaN empty, infinity ``infty``."""
     result = []
     for value in values.tolist():
         if value != value:
@@ -153,7 +157,7 @@ class BandsOverTime(NamedTuple):
 def bands_over_time(
     kind_name: str, configuration: Configuration, encounter: Encounter, alerts: Alerts
 ) -> BandsOverTime:
-    """Return the bands of a kind at all instants of an encounter, memory included."""
+    """Return the guidance bands of one kind at every instant of an encounter, after hysteresis."""
     pairs = encounter.pairs
     assert pairs.own is not None
     count = len(encounter.time_s)

@@ -11,17 +11,17 @@ from components.geometry import body_to_ned, east_north_m
 from components.messages.fused import FusedDetections
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
-from dsa_des.arrays.run_ticks import RunTicks, first_position_in_run, last_position_in_run
+from dsa_des.arrays.run_ticks import RunTicks, first_position_in_runs, last_position_at_or_before
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.failure_counts import NO_RUNS, count_cases
+from dsa_des.record.failure_counts import NO_RUNS, add_cases
 
 # Positions closer in time than this are one instant, from which no velocity follows, s.
 _SHORTEST_S = 1e-6
 
 
 class BelievedFlights(NamedTuple):
-    """Flights as they are believed at some scans: a row for each scan, or for each flight."""
+    """Relative flights believed: a row per scan and a column per target, or a row per track."""
 
     known: BoolArray  # (rows, columns)
     # Six of (rows, columns): east, north, up in m and their rates in m/s, ownship less target.
@@ -35,7 +35,7 @@ class BelievedFlights(NamedTuple):
 
 
 class BelievedPositions:
-    """Positions of the last seconds, true or measured, and straight flights fitted to them.
+    """Remembers recent target positions, true or measured, and fits straight flights to them.
 
     Where they are fewer than two instants of a target, its last two count, as long as the later of
     them is not older than `keep_s` or than the time between them: however slowly a sensor looks,
@@ -45,14 +45,14 @@ class BelievedPositions:
     def __init__(self, keep_s: float, targets: int) -> None:
         self._keep_s, self._targets = keep_s, targets
         #: East, north, up (targets, 3, n); NaN where a target was not seen.
-        self._seen = ReceivedRows.without_rows(time_s=(), position_m=(targets, 3))
+        self._seen = ReceivedRows.empty_with_columns(time_s=(), position_m=(targets, 3))
         #: How many, of how many, by run: sights without a range, and targets there without a
         #: velocity.
         self._rangeless, self._unmoving = np.zeros((2, 2, 0), dtype=np.int64)
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often something could not be judged, by run."""
-        return count_not_judged(self._rangeless, self._unmoving)
+        """Return how often targets could not be judged, as reason to (2, runs) counts."""
+        return not_judged_counts(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Store true target positions (n, targets, 3) at run times, and when each message came."""
@@ -60,7 +60,7 @@ class BelievedPositions:
         self._seen = self._seen.append(came, time_s=time_s, position_m=position)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
-        """Store measurements in body axes, turned by the attitude at their own instants."""
+        """Store detections with a range as positions in level axes, by the own attitude then."""
         sights: Tracks | FusedDetections = arrived.message
         row = sights.row_of_entries
         new = sights.target >= 0
@@ -68,11 +68,11 @@ class BelievedPositions:
             new &= sights.updated  # others came with an earlier row
         with_range = np.isfinite(sights.range_m)
         run = arrived.instants.run[row]
-        self._rangeless = count_cases(self._rangeless, run[new & ~with_range], run[new])
+        self._rangeless = add_cases(self._rangeless, run[new & ~with_range], run[new])
         new &= with_range
         # The attitude of when it was measured, of those that have arrived.
         came = arrived.instants.take(row)
-        pose = own.pose_of(RunTicks(came.run, sights.measured_tick), came, new)
+        pose = own.pose_index(RunTicks(came.run, sights.measured_tick), came, new)
         new &= pose >= 0
         row = row[new]
         yaw, pitch, roll = own.attitude_rad(pose[new])
@@ -82,17 +82,17 @@ class BelievedPositions:
         body = level * np.cos(azimuth), level * np.sin(azimuth), -range_m * np.sin(elevation)
         north, east, down = body_to_ned(*body, yaw, pitch, roll)
         # A row of its own for every instant of measurement.
-        line, of, made = _group_by_instant(sights.tick, row, sights.measured_tick[new])
+        line, of, made = _group_by_row_and_tick(sights.tick, row, sights.measured_tick[new])
         position = np.full((len(made), self._targets, 3), np.nan)
         position[line, sights.target[new]] = np.stack([east, north, -down], axis=-1)
         self.add_truth(arrived.instants.take(of), made / wake.ticks_per_s, position)
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
-        """Drop what no scan after some asks for."""
+        """Drop stored positions that no scan after those just judged can use."""
         kept = self._seen.time_s >= float(times_s.max()) - self._keep_s  # the next come later
         ends = self._seen.instants
-        ends = ends.take(ends.last_of_each)
-        for last in self._last_two(ends):
+        ends = ends.take(ends.last_position_of_runs)
+        for last in self._last_two_rows(ends):
             kept[last[last >= 0]] = True
         self._seen = self._seen.take(kept & (self._seen.replica >= wake.first_run))
 
@@ -103,19 +103,20 @@ class BelievedPositions:
         own: Mapping[str, FloatArray],
         poses: OwnPoses,
     ) -> BelievedFlights:
-        """Return the flights at some scans, of what came in their runs before them."""
-        known, state = self._states(asked, times_s)
+        """Return all targets' relative flights at some scans, from positions that came by then."""
+        known, state = self._fitted_states(asked, times_s)
         # Positions count from the ownship: its own less theirs is the other way round.
         return BelievedFlights(known, tuple(-state))
 
-    def _states(self, now: RunTicks, now_s: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """Return whose flight is known (n, targets), and its state (6, n, targets), else 0.
+    def _fitted_states(self, now: RunTicks, now_s: FloatArray) -> tuple[BoolArray, FloatArray]:
+        """Return whether each target's flight is known (n, targets), and its position and velocity
+        (6, n, targets), 0 where not.
 
         It is known from positions at two instants, not older than `keep_s`, else the last two.
         """
         came, time_s = self._seen.instants, self._seen.time_s
-        first = first_position_in_run(came, now.run)
-        counts = np.maximum(last_position_in_run(came, now) + 1 - first, 0)
+        first = first_position_in_runs(came, now.run)
+        counts = np.maximum(last_position_at_or_before(came, now) + 1 - first, 0)
         of = np.repeat(np.arange(len(now)), counts)
         start = np.cumsum(counts) - counts
         line = np.arange(len(of)) + (first - start)[of]
@@ -136,17 +137,17 @@ class BelievedPositions:
                 time_s[lines], np.ascontiguousarray(position), now_s[alike]
             )
         if not known.all() and len(time_s):
-            self._add_slow(now, now_s, known, state)
-        self._unmoving = count_cases(self._unmoving, NO_RUNS, now.run[known.nonzero()[0]])
+            self._fit_last_two_positions(now, now_s, known, state)
+        self._unmoving = add_cases(self._unmoving, NO_RUNS, now.run[known.nonzero()[0]])
         return known, state
 
-    def _add_slow(
+    def _fit_last_two_positions(
         self, now: RunTicks, now_s: FloatArray, known: BoolArray, state: FloatArray
     ) -> None:
-        """Fill in flights through the last two positions of those that are not known yet."""
+        """Fill in unknown flights, in place, by a line through a target's last two positions."""
         scans = np.flatnonzero(~known.all(axis=1))
         time_s = self._seen.time_s
-        last, before = self._last_two(now.take(scans))
+        last, before = self._last_two_rows(now.take(scans))
         apart_s = np.abs(time_s[last] - time_s[before])
         age_s = now_s[scans, np.newaxis] - np.maximum(time_s[last], time_s[before])
         slow = ~known[scans] & (before >= 0) & (age_s <= np.maximum(apart_s, self._keep_s))
@@ -158,10 +159,11 @@ class BelievedPositions:
         state[:, scans[of], target] = found[1][:, :, 0]
         there = (last >= 0) & (now_s[scans, np.newaxis] - time_s[last] <= self._keep_s)
         lacking = now.run[scans[(there & ~known[scans]).nonzero()[0]]]
-        self._unmoving = count_cases(self._unmoving, lacking, lacking)
+        self._unmoving = add_cases(self._unmoving, lacking, lacking)
 
-    def _last_two(self, now: RunTicks) -> tuple[IntArray, IntArray]:
-        """Return the last rows with a position of each target, of two instants, by some instants.
+    def _last_two_rows(self, now: RunTicks) -> tuple[IntArray, IntArray]:
+        """Return the last and the last but one stored row with a position of each target, at
+        different times, up to each given instant.
 
         Both are (n, targets), -1 where there is none.
         """
@@ -169,26 +171,28 @@ class BelievedPositions:
         seen = np.isfinite(self._seen.position_m[:, 0].T)
         # The last row up to each that has a position.
         up_to = np.maximum.accumulate(np.where(seen, np.arange(len(seen))[:, np.newaxis], -1))
-        first = first_position_in_run(came, now.run)[:, np.newaxis]
+        first = first_position_in_runs(came, now.run)[:, np.newaxis]
         target = np.arange(self._targets)
 
-        def earlier(row: IntArray) -> IntArray:
+        def last_row_with_position(row: IntArray) -> IntArray:
             found = np.where(row >= first, up_to[np.maximum(row, 0), target], -1)
             return np.where(found >= first, found, -1)
 
-        last = earlier(
-            np.broadcast_to(last_position_in_run(came, now)[:, np.newaxis], (len(now), len(target)))
+        last = last_row_with_position(
+            np.broadcast_to(
+                last_position_at_or_before(came, now)[:, np.newaxis], (len(now), len(target))
+            )
         )
-        before = earlier(last - 1)
+        before = last_row_with_position(last - 1)
         while True:  # what several sensors see at one instant gives no velocity
             alike = (before >= 0) & (np.abs(time_s[last] - time_s[before]) <= _SHORTEST_S)
             if not alike.any():
                 return last, before
-            before = np.where(alike, earlier(before - 1), before)
+            before = np.where(alike, last_row_with_position(before - 1), before)
 
 
-def count_not_judged(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
-    """Return in words how often something could not be judged, and why, by run."""
+def not_judged_counts(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
+    """Return by run, per sentence on a cause, counts of targets without a range or a velocity."""
     lacks = {
         "what it hears of has no range and is not judged": rangeless,
         "who is there has no velocity yet and is not judged": unmoving,
@@ -196,8 +200,8 @@ def count_not_judged(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntAr
     return {what: count for what, count in lacks.items() if count[1].any()}
 
 
-def true_positions_m(states: TrafficStates) -> FloatArray:
-    """Return where targets are from the ownship, east, north, up (rows, targets, 3), or NaN."""
+def true_relative_positions_m(states: TrafficStates) -> FloatArray:
+    """Return true positions east, north, up of own, m (rows, targets, 3), NaN where absent."""
     own = [np.radians(x)[:, np.newaxis] for x in (states.own_lat_deg, states.own_lon_deg)]
     east, north = east_north_m(np.radians(states.lat_deg), np.radians(states.lon_deg), *own)
     up = states.alt_m - states.own_alt_m[:, np.newaxis]
@@ -207,10 +211,10 @@ def true_positions_m(states: TrafficStates) -> FloatArray:
     return position
 
 
-def _group_by_instant(
+def _group_by_row_and_tick(
     tick: IntArray, row: IntArray, measured: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return the line of each entry, and the row and the instant of measurement of each line.
+    """Return each entry's index of its row-tick pair, and all pairs' rows and measuring ticks.
 
     `tick` is of a message's rows, `row` and `measured` of its entries.
     """
@@ -226,14 +230,16 @@ def _group_by_instant(
 def _fit_lines(
     time_s: FloatArray, position_m: FloatArray, now_s: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
-    """Return the states at some instants of least-squares lines through positions."""
+    """Return whether a least-squares line fits each target's positions (n, targets), and its state
+    at `now_s` (6, n, targets), else 0.
+    """
     seen = np.isfinite(position_m[..., 0])
     count = np.maximum(seen.sum(axis=0), 1)
     # Relative to now, so that clock readings do not cost digits.
     ago_s = np.where(seen, (time_s - now_s)[:, :, np.newaxis], 0.0)
-    mean_s = _sum(ago_s) / count
+    mean_s = _sum_over_positions(ago_s) / count
     off_s = np.where(seen, ago_s - mean_s, 0.0)
-    spread = _sum(off_s * off_s)
+    spread = _sum_over_positions(off_s * off_s)
     known = np.asarray(spread > _SHORTEST_S**2)
     position = np.where(seen[..., np.newaxis], position_m, 0.0)
     mean_m = position.sum(axis=0) / count[..., np.newaxis]
@@ -245,8 +251,8 @@ def _fit_lines(
     return known, np.where(known, state, 0.0)
 
 
-def _sum(values: FloatArray) -> FloatArray:
-    """Return the sums over the first axis of (positions, n, targets), each as it would be alone.
+def _sum_over_positions(values: FloatArray) -> FloatArray:
+    """Return sums over axis 0 of (positions, n, targets), bit-equal for one target or many.
 
     NumPy adds the numbers of a single target in pairs, and those of several one after the other.
     """

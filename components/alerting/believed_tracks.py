@@ -4,8 +4,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from components.alert_configuration.configuration import Deviations, largest
-from components.alerting.believed_positions import BelievedFlights, count_not_judged
+from components.alert_configuration.configuration import Deviations, longest_axis_deviation
+from components.alerting.believed_positions import BelievedFlights, not_judged_counts
 from components.alerting.others_tracks import OthersTracks
 from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
@@ -18,12 +18,12 @@ from components.messages.state_tracks import (
     STALE_S,
     StateTracks,
 )
-from dsa_des.arrays.entries import row_of_entries
+from dsa_des.arrays.entries import rows_of_entries
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_at_or_before
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.failure_counts import count_cases
+from dsa_des.record.failure_counts import add_cases
 
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
@@ -34,7 +34,7 @@ _OWN_VELOCITY = ("east_mps", "north_mps", "climb_mps")
 
 
 class EstimatedFlights:
-    """The tracks received so far: confirmed and coasted ones that have a range.
+    """Remembers the tracks received so far that are confirmed or coasted and have a range.
 
     One that has had no detection for `STALE_S` is refused, whatever is still held of it, and so is
     one of the platform itself that another platform's sensor made.
@@ -45,7 +45,7 @@ class EstimatedFlights:
         #: How many tracks have no range, of how many, by run.
         self.rangeless = np.zeros((2, 0), dtype=np.int64)
         #: Where the tracks of each row begin and how many there are.
-        self._rows = ReceivedRows.without_rows("begin", "count")
+        self._rows = ReceivedRows.empty_with_columns("begin", "count")
         #: Tracks, in no order: states (6, n) and covariances (21, n) in frames with an origin (3,
         #: n) of latitude, longitude (deg) and height (m), of the instant ``time_s``.
         self._tracks = KeyedTable.empty(
@@ -61,10 +61,10 @@ class EstimatedFlights:
         )
 
     def add(self, came: RunTicks, tracks: StateTracks) -> None:
-        """Store the tracks of a tracker, and when each row came."""
+        """Store each message row's confirmed and coasted tracks with a range, and when it came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
-        run = came.run[row_of_entries(tracks.offsets)]
-        self.rangeless = count_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
+        run = came.run[rows_of_entries(tracks.offsets)]
+        self.rangeless = add_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
@@ -83,8 +83,8 @@ class EstimatedFlights:
         )
         self._tracks = KeyedTable.concatenate([self._tracks, new.take(good)])
 
-    def keep(self, which: BoolArray) -> None:
-        """Keep some of the rows that came."""
+    def keep_rows(self, which: BoolArray) -> None:
+        """Drop all received message rows, with their tracks, but those where the mask is true."""
         if which.all():
             return
         rows = self._rows.take(which)
@@ -93,22 +93,22 @@ class EstimatedFlights:
 
     @property
     def arrival_ticks(self) -> RunTicks:
-        """When the rows that are remembered came."""
+        """Run and tick at which each remembered message row came."""
         return self._rows.instants
 
-    def states(
+    def states_at(
         self,
         now: RunTicks,
         now_s: FloatArray,
         own_place: FloatArray,
         own_velocity: FloatArray | None = None,
     ) -> tuple[IntArray, IntArray, FloatArray, Deviations, FloatArray]:
-        """Return the flights that are known at some instants, by instant and track.
+        """Return five arrays of tracks known at these instants, by instant and track number.
 
         They are the instant, number, state and deviations of each, and how old its last
         measurement is. `own_velocity` (north, east, down) tells which one is the ownship.
         """
-        last = self._rows.last(now)
+        last = self._rows.last_row_index(now)
         some = np.flatnonzero(last >= 0)
         rows = self._rows.take(last[some])
         index, entry = _enumerate_entries(rows.begin, rows.count)
@@ -119,13 +119,13 @@ class EstimatedFlights:
         instant, tracks = instant[order], self._tracks.take(entry[order])
         ahead_s = now_s[instant] - tracks.time_s
         state = _project_to_plane(tracks, ahead_s, own_place[:, instant])
-        deviations = _deviations(tracks.covariance, ahead_s)
+        deviations = _predicted_deviations(tracks.covariance, ahead_s)
         age_s = now_s[instant] - tracks.updated_s
         given = np.flatnonzero(tracks.from_others)
         if len(given) == 0 or self._others is None or own_velocity is None:
             return instant, tracks.number, state, deviations, age_s
         of = instant[given]
-        is_own, theirs = self._others.judge_tracks(
+        is_own, theirs = self._others.own_tracks_and_deviations(
             tracks.take(given), ahead_s[given], own_place[:, of], own_velocity[:, of], of
         )
         for mine, values in zip(deviations, theirs, strict=True):
@@ -136,14 +136,16 @@ class EstimatedFlights:
 
 
 def _enumerate_entries(begin: IntArray, count: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the row of every entry of some rows, and its place."""
+    """Return row and index of every entry, for rows of `count` entries starting at `begin`."""
     row = np.repeat(np.arange(len(count)), count)
     first = np.cumsum(count) - count
     return row, np.arange(len(row)) + (begin - first)[row]
 
 
 def _project_to_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
-    """Return places and velocities in the plane that touches the sphere below the ownship."""
+    """Return tracks predicted `ahead_s` as east, north, up and their rates (6, n), relative to the
+    ownship's place in its tangent plane.
+    """
     north, east, down = tracks.state[:3] + tracks.state[3:] * ahead_s
     lat_deg, lon_deg, alt_m = enu_to_geodetic(
         east, north, -down,
@@ -165,42 +167,54 @@ def _project_to_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatA
     )
 
 
-def _deviations(covariance: FloatArray, ahead_s: FloatArray) -> Deviations:
-    """Return the standard deviations of states that are carried on straight."""
+def _predicted_deviations(covariance: FloatArray, ahead_s: FloatArray) -> Deviations:
+    """Return standard deviations of tracks after `ahead_s` straight on, from covariances now."""
 
-    def of(i: int, j: int) -> AnyArray:
+    def covariance_of(i: int, j: int) -> AnyArray:
         return covariance[_PAIRS.index((min(i, j), max(i, j)))]
 
-    def later(i: int, j: int) -> AnyArray:
-        return of(i, j) + ahead_s * (of(i, j + 3) + of(j, i + 3)) + ahead_s**2 * of(i + 3, j + 3)
+    def predicted_covariance_of(i: int, j: int) -> AnyArray:
+        return (
+            covariance_of(i, j)
+            + ahead_s * (covariance_of(i, j + 3) + covariance_of(j, i + 3))
+            + ahead_s**2 * covariance_of(i + 3, j + 3)
+        )
 
-    def root(variance: AnyArray) -> AnyArray:
+    def root_or_zero(variance: AnyArray) -> AnyArray:
         return np.sqrt(np.maximum(variance, 0.0))
 
     return Deviations(
-        largest(root(later(1, 1)), root(later(0, 0)), later(0, 1)),
-        root(later(2, 2)),
-        largest(root(of(4, 4)), root(of(3, 3)), of(3, 4)),
-        root(of(5, 5)),
+        longest_axis_deviation(
+            root_or_zero(predicted_covariance_of(1, 1)),
+            root_or_zero(predicted_covariance_of(0, 0)),
+            predicted_covariance_of(0, 1),
+        ),
+        root_or_zero(predicted_covariance_of(2, 2)),
+        longest_axis_deviation(
+            root_or_zero(covariance_of(4, 4)),
+            root_or_zero(covariance_of(3, 3)),
+            covariance_of(3, 4),
+        ),
+        root_or_zero(covariance_of(5, 5)),
     )
 
 
 class BelievedTracks:
-    """Tracks of one tracker over time."""
+    """Remembers the tracks of one tracker, and gives relative flights of them at any scan."""
 
     def __init__(self, targets: int, others: OthersTracks) -> None:
         self._estimates = EstimatedFlights(others)
         #: Where the targets are: a track is named by the nearest.
-        self._true = ReceivedRows.without_rows(position_m=(targets, 3))
+        self._true = ReceivedRows.empty_with_columns(position_m=(targets, 3))
         #: At how many scans the ownship's velocity is not known yet, of how many, by run.
         self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often something could not be judged, by run."""
-        return count_not_judged(self._estimates.rangeless, self._unmoving)
+        """Return how often targets could not be judged, as reason to (2, runs) counts."""
+        return not_judged_counts(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
-        """Store the tracks of a tracker."""
+        """Store the tracks of a tracker's message and when each of its rows came."""
         self._estimates.add(arrived.instants, arrived.message)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
@@ -214,48 +228,50 @@ class BelievedTracks:
         own: Mapping[str, FloatArray],
         poses: OwnPoses,
     ) -> BelievedFlights:
-        """Return the flights of tracks at some scans, one in each row.
+        """Return relative flights, one row per scan and track; none if own velocity is unknown.
 
         `own` has the ownship's velocity, NaN where unknown yet.
         """
         # Without two poses the ownship's own velocity is not known, and no relative one.
         known = np.isfinite(own["east_mps"])
         moving = known.nonzero()[0]
-        self._unmoving = count_cases(self._unmoving, asked.run[~known], asked.run)
+        self._unmoving = add_cases(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
         east, north, climb = (own[name][moving] for name in _OWN_VELOCITY)
         velocity_m_s = np.stack([north, east, -climb])
-        result = self._estimates.states(now, times_s[moving], poses.place(now), velocity_m_s)
+        result = self._estimates.states_at(
+            now, times_s[moving], poses.position_known_at(now), velocity_m_s
+        )
         scan, number, state, deviations, age_s = moving[result[0]], *result[1:]
         mine = (own[name][scan] for name in _OWN_VELOCITY)
         velocity = (own_part - part for own_part, part in zip(mine, state[3:], strict=True))
         relative = tuple(part[:, np.newaxis] for part in (*-state[:3], *velocity))
         known = np.ones((len(scan), 1), dtype=bool)
-        target = self._nearest(asked.take(scan), state[:3].T)
+        target = self._nearest_target(asked.take(scan), state[:3].T)
         return BelievedFlights(known, relative, scan, target, number, deviations, age_s)
 
-    def _nearest(self, now: RunTicks, position_m: FloatArray) -> IntArray:
-        """Return the target nearest to each of some positions (n, 3), -1 where none is near."""
+    def _nearest_target(self, now: RunTicks, position_m: FloatArray) -> IntArray:
+        """Return the index of the nearest true target (n,), -1 for none within `_SAME_TARGET_M`."""
         true = self._true
         if true.position_m.shape[0] == 0 or len(true) == 0 or len(now) == 0:
             return np.full(len(now), -1, dtype=np.int64)
-        true_m = np.moveaxis(true.position_m[:, :, np.maximum(true.last(now), 0)], -1, 0)
+        true_m = np.moveaxis(true.position_m[:, :, np.maximum(true.last_row_index(now), 0)], -1, 0)
         away = true_m - position_m[:, np.newaxis]
         range_m = np.nan_to_num(np.linalg.norm(away, axis=2), nan=np.inf)
         return np.where(range_m.min(axis=1) <= _SAME_TARGET_M, range_m.argmin(axis=1), -1)
 
     def forget(self, asked: RunTicks, times_s: FloatArray, wake: Wake) -> None:
-        """Drop what later ones have replaced at some scans."""
-        self._estimates.keep(_is_needed_later(self._estimates.arrival_ticks, asked, wake))
+        """Drop tracks and true positions superseded by these scans, and those of ended runs."""
+        self._estimates.keep_rows(_is_needed_later(self._estimates.arrival_ticks, asked, wake))
         self._true = self._true.take(_is_needed_later(self._true.instants, asked, wake))
 
 
 def _is_needed_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
-    """Return which rows later scans may still need: the last one before each of them, and later
-    ones.
+    """Return a mask of rows to keep: those that came last before each run's latest scan or after
+    it, in runs that go on.
     """
-    ends = asked.take(asked.last_of_each)
-    last = last_position_in_run(came, ends)
+    ends = asked.take(asked.last_position_of_runs)
+    last = last_position_at_or_before(came, ends)
     there = np.minimum(np.searchsorted(ends.run, came.run), len(ends) - 1)
     # Of runs without a scan all rows, unless they have ended.
     kept = (ends.run[there] != came.run) | (np.arange(len(came)) >= last[there])

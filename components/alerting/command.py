@@ -54,6 +54,6 @@ def alert(**options: Any) -> None:
     FILE is a file of recorded aircraft of any kind that traffic.file reads: .daa and .xyz, tables,
     receivers' logs, tracks and more; or a folder of .daa and .xyz files.
     """
-    from components.alerting.alert_files import alert_files
+    from components.alerting.alert_files import write_alert_files
 
-    alert_files(**options)
+    write_alert_files(**options)

@@ -7,22 +7,26 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from components.alert_configuration.conf_file import read_conf
-from components.alert_configuration.configuration import Configuration, Deviations, margins
+from components.alert_configuration.configuration import (
+    Configuration,
+    Deviations,
+    uncertainty_bounds,
+)
 from components.alerting.alert_tables import remove_hysteresis
 from components.alerting.believed_positions import (
     BelievedFlights,
     BelievedPositions,
-    true_positions_m,
+    true_relative_positions_m,
 )
 from components.alerting.believed_tracks import BelievedTracks
-from components.alerting.levels import AlertPairs, levels_without_memory, memory_rule
+from components.alerting.levels import AlertPairs, memory_rule, times_and_due_without_memory
 from components.alerting.memory import LevelMemory
 from components.alerting.others_tracks import OthersTracks
 from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
-from components.messages.detections import describe_rangeless
+from components.messages.detections import names_of_rangeless_sensors
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
@@ -32,7 +36,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
 from dsa_des.block.ladder import Verified
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Arrivals, Wake
 
 _RELATIVE = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
@@ -103,12 +107,12 @@ class DaidalusAlerting(Component):
     )  # fmt: skip
 
     def request(self, port: str) -> Any:
-        """Return a request for no poses on the fused input: own poses come with the states."""
+        """Request no poses on ``fused``, as they come with the states; nothing elsewhere."""
         return WITHOUT_POSE if port == "fused" else None
 
     def setup(self) -> None:
         """Read the configuration and find out what is believed."""
-        configuration, self._alerter = self.p.read()
+        configuration, self._alerter = self.p.read_configuration()
         if not self.p.hysteresis:
             configuration = remove_hysteresis(configuration)
         ports = {producer.port for producer in self.context.producers}
@@ -121,7 +125,7 @@ class DaidalusAlerting(Component):
         self._configuration: Configuration = configuration
         self._roster: Any = None
         self._own = OwnPoses(self.context.ticks_per_s)
-        self._others = OthersTracks.of(
+        self._others = OthersTracks.from_context(
             self.context, self.p.own_gate_probability, self.p.acceleration_intensity_m2_s3
         )
         # Over which time the ownship's velocity is taken; at least its last two poses count.
@@ -130,7 +134,9 @@ class DaidalusAlerting(Component):
 
     def offer(self, port: str) -> AlertsOffered:
         """Return the number of alert levels and the interval between scans, for consumers."""
-        return AlertsOffered(len(self.p.read()[1].levels), float(1 / self.p.scan_rate_hz))
+        return AlertsOffered(
+            len(self.p.read_configuration()[1].levels), float(1 / self.p.scan_rate_hz)
+        )
 
     def warnings(self) -> list[str]:
         """Return warnings on ignored configuration keys, and on input that cannot cause alerts."""
@@ -146,18 +152,18 @@ class DaidalusAlerting(Component):
                 f"{float(self.context.duration_s):g} s it scans once, which tells no velocity"
             )
         heard = [one for one in self.context.producers if one.port == self._source]
-        if blind := describe_rangeless(heard):
+        if blind := names_of_rangeless_sensors(heard):
             said.append(f"{blind} measures no range: nothing of what it hears of is judged")
         return said
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often a flight could not be judged, by run."""
+        """Return how often flights could not be judged, as reason to (2, runs) counts."""
         return {} if self._roster is None else self._belief.failure_counts()
 
     def run(self, wake: Wake) -> AlertLevels | None:
         """Store the messages of this wake-up, and return the alert levels of each scan due."""
         for arrived in wake.arrivals("states"):
-            self._take_states(arrived, wake)
+            self._store_states(arrived, wake)
         if self._roster is None:
             return None
         if self._source:
@@ -165,11 +171,11 @@ class DaidalusAlerting(Component):
                 self._belief.add(arrived, self._own, wake)
         asked = wake.instants.take(wake.scans >= 0)
         # Before the first state of a run has come, it has no levels.
-        asked = asked.take(self._own.has_come(asked))
-        return self._levels(asked, wake) if len(asked) else None
+        asked = asked.take(self._own.has_pose_by(asked))
+        return self._compute_alert_levels(asked, wake) if len(asked) else None
 
-    def _take_states(self, arrived: Arrivals, wake: Wake) -> None:
-        """Remember the ownship's pose, and where the targets are if that is asked for."""
+    def _store_states(self, arrived: Arrivals, wake: Wake) -> None:
+        """Store own poses, and true target positions unless alerts are based on measurements."""
         states: TrafficStates = arrived.message
         if self._roster is None:
             self._roster = states.roster
@@ -182,28 +188,28 @@ class DaidalusAlerting(Component):
         self._own.add(arrived.instants, states)
         if self._source not in ("tracks", "fused"):
             time_s = states.tick / wake.ticks_per_s
-            self._belief.add_truth(arrived.instants, time_s, true_positions_m(states))
+            self._belief.add_truth(arrived.instants, time_s, true_relative_positions_m(states))
 
-    def _levels(self, asked: RunTicks, wake: Wake) -> AlertLevels:
-        """Return the levels at some scans."""
+    def _compute_alert_levels(self, asked: RunTicks, wake: Wake) -> AlertLevels:
+        """Return alert levels of known flights at these scans as a message; update the memory."""
         times = asked.tick / wake.ticks_per_s
-        own = self._own.states(asked, self._over_s)
+        own = self._own.altitude_and_mean_velocity(asked, self._over_s)
         flights = self._belief.flights(asked, times, own, self._own)
         known = flights.known
         row, column = known.nonzero()
         relative = tuple(part[row, column] for part in flights.relative)
         wrong = flights.deviations and Deviations(*(part[row] for part in flights.deviations))
-        bounds = wrong and margins(self._configuration, wrong, np.hypot(*relative[:2]))
+        bounds = wrong and uncertainty_bounds(self._configuration, wrong, np.hypot(*relative[:2]))
         scan = np.arange(len(asked)) if flights.scan is None else flights.scan
-        pairs = AlertPairs(relative, _ownship_flights(own, scan[row]), bounds)
-        times_s, *now_due = levels_without_memory(self._configuration, self._alerter, pairs)
+        pairs = AlertPairs(relative, _ownship_states(own, scan[row]), bounds)
+        times_s, *now_due = times_and_due_without_memory(self._configuration, self._alerter, pairs)
         # Memory is asked of all, also of those that are not known now.
         columns = known.shape[1]
         entry = row * columns + column
         due, early = np.zeros((2, known.size, times_s.shape[1]), dtype=bool)
         due[entry], early[entry] = now_due
         each = scan.repeat(columns)
-        level = self._memory.levels(
+        level = self._memory.update_levels(
             asked.run[each],
             np.tile(np.arange(columns), len(known)) if flights.number is None else flights.number,
             times[each],
@@ -218,7 +224,7 @@ class DaidalusAlerting(Component):
         numbered = range(1, len(self._alerter.levels) + 1)
         return AlertLevels(
             asked.tick,
-            offsets_of(scan[row], len(asked)),
+            offsets_from_entry_rows(scan[row], len(asked)),
             column if flights.target is None else flights.target,
             level[entry],
             {f"time_to_level_{k}_s": times_s[:, k - 1].copy() for k in numbered},
@@ -235,25 +241,27 @@ class DaidalusAlerting(Component):
         )
 
     def _forget(self, asked: RunTicks, times: FloatArray, wake: Wake) -> None:
-        """Drop what no later scan asks for."""
+        """Drop positions, tracks, memories and poses that no later scan needs."""
         self._belief.forget(asked, times, wake)
-        ends = asked.last_of_each
-        self._memory.forget(asked.run[ends], times[ends])
-        self._memory.forget_before(wake.first_run)
+        ends = asked.last_position_of_runs
+        self._memory.forget_absent(asked.run[ends], times[ends])
+        self._memory.forget_runs_before(wake.first_run)
         # The next scans come after all of these.
         since = int(asked.tick.max()) - round(self._over_s * self.context.ticks_per_s)
-        self._own.set_aside(since, wake, late_sights=self._source != "estimates")
+        self._own.separate_old_poses(since, wake, late_sights=self._source != "estimates")
 
 
 def _track_columns(flights: BelievedFlights) -> dict[str, AnyArray]:
-    """Return the recorded columns of the believed tracks; none without tracks."""
+    """Return track number and age columns to record; empty unless alerts are based on tracks."""
     if flights.number is None or flights.age_s is None:
         return {}
     return {"track": flights.number, "track_age_s": flights.age_s}
 
 
-def _ownship_flights(own: Mapping[str, FloatArray], scan: IntArray) -> State:
-    """Return the ownship's flight at some scans, in its own plane."""
+def _ownship_states(own: Mapping[str, FloatArray], scan: IntArray) -> State:
+    """Return the ownship's state at the scan of each row, with its position at 0; unknown altitude
+    or velocity is 0.
+    """
     motion = np.array([own[name][scan] for name in _OWN_MOTION])
     motion[np.isnan(motion)] = 0.0
     zero = np.zeros(len(scan))

@@ -7,7 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.alert_configuration.configuration import Configuration, Deviations, largest, margins
+from components.alert_configuration.configuration import (
+    Configuration,
+    Deviations,
+    longest_axis_deviation,
+    uncertainty_bounds,
+)
 from components.alerting.levels import AlertPairs
 from components.flights.attitude import fit_path
 from components.flights.sampled_flight import SampledTrajectory
@@ -51,7 +56,7 @@ class Encounter(NamedTuple):
 
     @property
     def pairs(self) -> AlertPairs:
-        """The pairs of ownship and target at all times."""
+        """Ownship and target at all times, (times, targets), as the alerting takes them."""
         alt_m, *velocity = (part[:, np.newaxis] for part in self.own_state)
         zero = np.zeros(1)
         own = State(*np.broadcast_arrays(zero, zero, alt_m, *velocity, self.present)[:6])
@@ -74,7 +79,7 @@ def read_encounter(
     `TrafficFileError` with all problems of the file, also without velocities or with an alerter
     that is not there.
     """
-    samples, notes = _samples(path, choice)
+    samples, notes = _read_samples(path, choice)
     problems = Problems(str(path))
     names = tuple(samples)
     own = samples[names[0]]
@@ -86,12 +91,14 @@ def read_encounter(
             aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
     index, present = _simultaneous_samples(own["time"], others)
-    targets = {key: _columns_at([o[key] for o in others], index) for key in own}
+    targets = {key: _select_samples([o[key] for o in others], index) for key in own}
     flat = "sx" in own
-    state = _flat_states if flat else _projected_states
+    state = _states_of_flat_file if flat else _states_of_geodetic_file
     relative, own_state, own_plane, target_plane = state(own, targets)
-    which = _alerters(configuration, own, targets, present, problems)
-    bounds = _bounds(configuration, own, targets, relative) if "s_ew_std" in own else None
+    which = _alerter_indices(configuration, own, targets, present, problems)
+    bounds = (
+        _uncertainty_bounds(configuration, own, targets, relative) if "s_ew_std" in own else None
+    )
     return Encounter(
         names[0],
         names[1:],
@@ -109,10 +116,10 @@ def read_encounter(
     )
 
 
-def _samples(
+def _read_samples(
     path: str | PathLike[str], choice: TrafficChoice
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
-    """Return the samples of each aircraft of a file, and what was assumed of them."""
+    """Return a file's samples by aircraft name, and notes on assumptions made in reading."""
     file = read_traffic([Path(path)], choice)
     if file.kind == DAIDALUS and choice == TrafficChoice():
         return read_daa_samples(path, tuple(EXTRA_COLUMNS)), ()
@@ -139,7 +146,7 @@ def _samples(
 
 
 def _sample_flight(craft: SampledTrajectory, time_s: FloatArray, start_s: float) -> Samples:
-    """Return the samples of an aircraft at some times of its flight."""
+    """Return columns time, lat, lon, alt, velocity of an aircraft, interpolated to these times."""
     known_s, path = craft.sample_times_s, (craft.lat_deg, craft.lon_deg, craft.alt_m)
     velocity = craft.velocity_enu_mps
     if velocity is None:
@@ -154,7 +161,7 @@ def _sample_flight(craft: SampledTrajectory, time_s: FloatArray, start_s: float)
 
 
 def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
-    """Return the wind at the ownship's times, towards the east and north."""
+    """Return wind (2, times), m/s to east, north: given, else by heading and airspeed, else 0."""
     count = len(own["time"])
     if wind_mps is not None:
         return np.repeat(np.asarray(wind_mps, dtype=np.float64)[:, np.newaxis], count, axis=1)
@@ -166,23 +173,25 @@ def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
 
 
 def _simultaneous_samples(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
-    """Return each target's sample at each of the ownship's times, and whether there is one."""
+    """Return each target's sample index at each own time, and whether its time is exactly that."""
     index = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
     index = np.minimum(index, np.array([len(other["time"]) - 1 for other in others]))
-    times = _columns_at([other["time"] for other in others], index)
+    times = _select_samples([other["time"] for other in others], index)
     return index, times == own_s[:, np.newaxis]
 
 
-def _columns_at(columns: list[FloatArray], place: IntArray) -> FloatArray:
+def _select_samples(columns: list[FloatArray], place: IntArray) -> FloatArray:
     return np.stack(
         [column[np.maximum(place[:, i], 0)] for i, column in enumerate(columns)], axis=1
     )
 
 
-def _flat_states(
+def _states_of_flat_file(
     own: Samples, targets: Samples
 ) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
-    """Return the states of a file in east, north and up."""
+    """Return relative states, own altitude and velocity, own and target positions of a file with
+    east, north and up.
+    """
     velocity = [(own[key][:, np.newaxis], targets[key]) for key in ("ve", "vn", "vu")]
     at = [(own[key][:, np.newaxis], targets[key]) for key in ("sx", "sy", "sz")]
     relative = tuple(mine - other for mine, other in [*at, *velocity])
@@ -194,10 +203,12 @@ def _flat_states(
     )
 
 
-def _projected_states(
+def _states_of_geodetic_file(
     own: Samples, targets: Samples
 ) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
-    """Return the states of a file in latitude and longitude, in the plane below the ownship."""
+    """Return relative states, own altitude and velocity, own and target positions of a file with
+    latitude and longitude, in tangent planes.
+    """
     own_lat, own_lon = (np.radians(own[key])[:, np.newaxis] for key in ("lat", "lon"))
     lat, lon = (np.radians(targets[key]) for key in ("lat", "lon"))
     mine = east_north_mps(
@@ -222,14 +233,16 @@ def _projected_states(
     )
 
 
-def _alerters(
+def _alerter_indices(
     configuration: Configuration,
     own: Samples,
     targets: Samples,
     present: BoolArray,
     problems: Problems,
 ) -> IntArray:
-    """Return the place of each target's alerter, from 0."""
+    """Return the index, from 0, of the alerter that applies to each target at each time; a problem
+    for one that does not exist.
+    """
     shape = present.shape
     if "alerter" not in own:
         return np.zeros(shape, dtype=np.int64)
@@ -248,7 +261,7 @@ def _alerters(
     return np.where(present, number, 1.0).astype(np.int64) - 1
 
 
-def _bounds(
+def _uncertainty_bounds(
     configuration: Configuration, own: Samples, targets: Samples, relative: Relative
 ) -> Bounds:
     """Return how far relative states may be wrong: standard deviations times z-scores."""
@@ -259,14 +272,16 @@ def _bounds(
         return np.asarray(find(*mine) + find(*theirs))
 
     deviations = Deviations(
-        deviations_of_both(_longest_deviation, "s_ew_std", "s_ns_std", "s_en_std"),
+        deviations_of_both(_longest_axis_deviation, "s_ew_std", "s_ns_std", "s_en_std"),
         deviations_of_both(np.abs, "sz_std"),
-        deviations_of_both(_longest_deviation, "v_ew_std", "v_ns_std", "v_en_std"),
+        deviations_of_both(_longest_axis_deviation, "v_ew_std", "v_ns_std", "v_en_std"),
         deviations_of_both(np.abs, "vz_std"),
     )
-    return margins(configuration, deviations, np.hypot(relative[0], relative[1]))
+    return uncertainty_bounds(configuration, deviations, np.hypot(relative[0], relative[1]))
 
 
-def _longest_deviation(east: FloatArray, north: FloatArray, signed_root: FloatArray) -> FloatArray:
-    """Return the deviation along the longest axis; files give signed roots of covariances."""
-    return largest(east, north, np.sign(signed_root) * signed_root**2)
+def _longest_axis_deviation(
+    east: FloatArray, north: FloatArray, signed_root: FloatArray
+) -> FloatArray:
+    """Return the longest axis's deviation, where the covariance is given as its signed root."""
+    return longest_axis_deviation(east, north, np.sign(signed_root) * signed_root**2)

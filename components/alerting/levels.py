@@ -6,7 +6,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.alerting.memory import AlertMemory, MemoryRule
-from components.guidance.manoeuvre_kinds import kind_of
+from components.guidance.manoeuvre_kinds import manoeuvres_of_kind
 from components.guidance.situation import Detector, State
 from components.well_clear.detection import Bounds, detection_span, select_bounds
 from components.well_clear.relative_motion import is_surely_less
@@ -24,7 +24,9 @@ def levels_due_by_spread(
     intruder: State,
     bounds: Bounds | None,
 ) -> tuple[BoolArray, BoolArray]:
-    """Return whether each level is due by its spreads, by its alerting time and its early one."""
+    """Return two masks (n, levels): a conflict lies within a level's spreads before its alerting
+    time, and before its early one.
+    """
     count = len(own.up_m)
     due, early = (np.zeros((count, len(levels)), dtype=bool) for _ in range(2))
     for start in range(0, count, _MOST_SPREAD_AT_ONCE):
@@ -36,7 +38,7 @@ def levels_due_by_spread(
                 level.volume, bounds=select_bounds(of_part, (slice(None), np.newaxis))
             )
             for kind_name, spread in level.spreads:
-                kind = kind_of(kind_name, mine, configuration)
+                kind = manoeuvres_of_kind(kind_name, mine, configuration)
                 conflicts = kind.find_conflicts(theirs.columns(), detector)
                 middle = kind.own_value[:, np.newaxis]
                 low, high = kind.values[:, :-1] - middle, kind.values[:, 1:] - middle
@@ -67,7 +69,7 @@ class Alerts(NamedTuple):
 
 
 def memory_rule(configuration: Configuration) -> MemoryRule:
-    """Return how a configuration has alert levels remembered."""
+    """Return the hysteresis, persistence and m-of-n settings of a configuration."""
     return MemoryRule(
         configuration["hysteresis_time"],
         configuration["persistence_time"],
@@ -83,7 +85,7 @@ def violation_times_s(
     bounds: Bounds | None,
     own_up_mps: tuple[FloatArray, FloatArray] | None = None,
 ) -> FloatArray:
-    """Return the time to violation of each level, (n, levels)."""
+    """Return the time in s until each level's volume is violated, (n, levels), within lookahead."""
     count = len(relative[0])
     result = np.empty((count, len(levels)))
     for start in range(0, count, _MOST_AT_ONCE):
@@ -104,8 +106,10 @@ def violation_times_s(
     return result
 
 
-def due_levels(levels: tuple[Level, ...], violation_s: FloatArray) -> tuple[BoolArray, BoolArray]:
-    """Return whether each level is due, by its alerting time and by its early one, (n, levels)."""
+def due_and_early_due_levels(
+    levels: tuple[Level, ...], violation_s: FloatArray
+) -> tuple[BoolArray, BoolArray]:
+    """Return masks (n, levels): violated before the level's alerting time, and its early time."""
     ordinary = np.array([level.alerting_time_s for level in levels])
     early = np.array([level.early_alerting_time_s for level in levels])
     inside = violation_s == 0.0
@@ -125,16 +129,18 @@ class AlertPairs(NamedTuple):
     bounds: Bounds | None = None  # (n,) or None: how far the relative states may be wrong
 
     def select(self, which: Any) -> "AlertPairs":
-        """Return some of the pairs."""
+        """Return the pairs at an index or where a mask is true."""
         own = None if self.own is None else self.own.rows(which)
         relative = tuple(part[which] for part in self.relative)
         return AlertPairs(relative, own, select_bounds(self.bounds, which))
 
 
-def levels_without_memory(
+def times_and_due_without_memory(
     configuration: Configuration, alerter: Alerter, pairs: AlertPairs
 ) -> tuple[FloatArray, BoolArray, BoolArray]:
-    """Return the time to each level's volume, and whether it is due, at once and early."""
+    """Return three arrays (n, levels): time to each level's volume in s, whether it is due, and
+    whether it is due by its early time.
+    """
     own, levels = pairs.own, alerter.levels
     result = violation_times_s(
         levels,
@@ -143,7 +149,7 @@ def levels_without_memory(
         pairs.bounds,
         None if own is None else (own.up_m, own.climb_mps),
     )
-    due, early = due_levels(levels, result)
+    due, early = due_and_early_due_levels(levels, result)
     if own is not None and any(level.spreads for level in levels):
         intruder = State(*(mine - part for mine, part in zip(own, pairs.relative, strict=True)))
         by_spread = levels_due_by_spread(configuration, levels, own, intruder, pairs.bounds)
@@ -158,7 +164,7 @@ def alert_levels(
     pairs: AlertPairs,
     alerter: IntArray | None = None,
 ) -> Alerts:
-    """Return the alert levels of targets over time, memory included.
+    """Return all targets' alert levels over time, after hysteresis; -1 where one is not present.
 
     `time_s` (times,) is the ownship's; `pairs` (times, targets) are finite also where a target is
     not `present`. `alerter` (times, targets) is the index of each one's in the configuration, by
@@ -175,7 +181,7 @@ def alert_levels(
     for number, one in enumerate(configuration.alerters):
         cells = np.nonzero((which == number) & present)
         if len(cells[0]) and one.levels:
-            result = levels_without_memory(configuration, one, pairs.select(cells))
+            result = times_and_due_without_memory(configuration, one, pairs.select(cells))
             count = len(one.levels)
             for whole, part in zip((violation_s, due, early), result, strict=True):
                 whole[cells[0], cells[1], :count] = part

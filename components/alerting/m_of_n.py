@@ -24,7 +24,7 @@ class MOfNParameters(Parameters):
     )
 
     @model_validator(mode="after")
-    def _m_within_n(self) -> "MOfNParameters":
+    def _check_m_within_n(self) -> "MOfNParameters":
         if self.m > self.n:
             raise ValueError(f"m is {self.m}: it must be at most n, {self.n}")
         return self
@@ -52,7 +52,7 @@ class MOfNAlerts(Component):
         self._memory = LevelMemory(MemoryRule(self.p.forget_s, self.p.hold_s, self.p.m, self.p.n))
 
     def offer(self, port: str) -> AlertsOffered | None:
-        """Pass on the offer of the unfiltered alerts."""
+        """Return the offer of the block whose alerts are filtered; None without one."""
         return next((p.offer for p in self.context.producers), None)
 
     def warnings(self) -> list[str]:
@@ -73,8 +73,10 @@ class MOfNAlerts(Component):
         row = alerts.row_of_entries
         time_s, run = wake.time_s, wake.run
         due = alerts.level[:, np.newaxis] >= np.arange(1, MOST_LEVELS + 1)
-        level = self._memory.levels(run[row], alerts.contacts(), time_s[row], due, due)
-        ends = wake.instants.last_of_each
-        self._memory.forget(run[ends], time_s[ends])
-        self._memory.forget_before(wake.first_run)
+        level = self._memory.update_levels(
+            run[row], alerts.contact_numbers(), time_s[row], due, due
+        )
+        ends = wake.instants.last_position_of_runs
+        self._memory.forget_absent(run[ends], time_s[ends])
+        self._memory.forget_runs_before(wake.first_run)
         return replace(alerts, tick=wake.ticks, level=level)

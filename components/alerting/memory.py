@@ -5,8 +5,8 @@ from typing import Self
 
 import numpy as np
 
-from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
-from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, union_of_instants
+from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
+from dsa_des.arrays.run_ticks import RunTicks, last_position_at_or_before, union_of_instants
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 _NONE = -1
@@ -16,7 +16,7 @@ _LONG_AGO_S = -np.inf
 
 @dataclass(frozen=True)
 class MemoryRule:
-    """How long and how an alert level is remembered."""
+    """For how long and by which m-of-n rule an alert level is remembered."""
 
     hysteresis_s: float  # A gap in time longer than this forgets everything; 0 remembers nothing
     persistence_s: float  # A level that rose less than this ago does not fall
@@ -25,7 +25,7 @@ class MemoryRule:
 
 
 class AlertMemory(KeyedTable):
-    """What is remembered of targets, by run (``replica``) and ``number``.
+    """Remembered alert levels, a row for each run (``replica``) and target or track ``number``.
 
     ``output`` is the level that is on, -1 for none, and ``risen_s`` when it rose; ``queue`` (n of
     the rule, targets) has the last levels, ``last_s`` is when the target was last present, and
@@ -34,7 +34,7 @@ class AlertMemory(KeyedTable):
 
     @classmethod
     def new(cls, rule: MemoryRule, replica: IntArray, number: IntArray) -> Self:
-        """Return the memory of targets of which nothing is known yet."""
+        """Return the initial memory of the given targets: no level so far."""
         count = len(number)
         return cls(
             replica=replica,
@@ -54,7 +54,7 @@ class AlertMemory(KeyedTable):
         due: BoolArray,
         early: BoolArray,
     ) -> tuple[Self, IntArray]:
-        """Return the memory after one instant, and the level of each target.
+        """Return the memory after one more instant, and the alert level of each target then.
 
         `due` and `early` (targets, levels) say which levels are due by their times, and which if
         they are on already.
@@ -91,18 +91,20 @@ class AlertMemory(KeyedTable):
         return after, level
 
     def early_levels(self, rule: MemoryRule, now_s: float, present: BoolArray) -> IntArray:
-        """Return whose early alerting time counts for guidance: levels that rose before now."""
+        """Return each present target's level if it rose before now, so that its early alerting time
+        counts for guidance; else 0.
+        """
         counts = present & (rule.hysteresis_s > 0.0) & (self.risen_s < now_s)
         return np.where(counts, np.maximum(self.output, 0), 0)
 
     @property
     def keys(self) -> RunTicks:
-        """Run and number of each."""
+        """Run and target number of each row."""
         return RunTicks(self.replica, self.number)
 
 
 class LevelMemory:
-    """Memories of targets or tracks by run and number; who was gone for too long is new."""
+    """Remembers alert levels by run and target or track number, anew after a long absence."""
 
     def __init__(self, rule: MemoryRule) -> None:
         self._rule = rule
@@ -114,7 +116,7 @@ class LevelMemory:
         """Return how many targets are remembered."""
         return len(self._known)
 
-    def levels(
+    def update_levels(
         self,
         run: IntArray,
         number: IntArray,
@@ -123,7 +125,7 @@ class LevelMemory:
         early: BoolArray,
         present: BoolArray | None = None,
     ) -> IntArray:
-        """Return and remember the levels of targets (n,) at instants of a run, given in order.
+        """Update the memory with targets (n,) in order of time, and return their alert levels.
 
         `due` and `early` (n, levels) are as for `AlertMemory.step`; all are present by default.
         """
@@ -131,38 +133,40 @@ class LevelMemory:
         if len(number) == 0:
             return level
         present = np.ones(len(number), dtype=bool) if present is None else present
-        index = self._places(RunTicks(run, number))
-        for rows in occurrences_by_turn(index):
+        index = self._rows_of_targets(RunTicks(run, number))
+        for rows in indices_by_occurrence(index):
             part, level[rows] = self._known.take(index[rows]).step(
                 self._rule, now_s[rows], present[rows], due[rows], early[rows]
             )
-            self._store(index[rows], part)
+            self._write_rows(index[rows], part)
         return level
 
-    def forget(self, runs: IntArray, times_s: FloatArray) -> None:
-        """Forget who was gone for too long, given the time in some runs (ascending)."""
+    def forget_absent(self, runs: IntArray, times_s: FloatArray) -> None:
+        """Drop targets that were not updated for longer than the hysteresis time, by the present
+        time of each run (ascending).
+        """
         of = self._known.replica
         last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
         away_s = np.where(runs[last] == of, times_s[last] - self._known.asked_s, 0.0)
         self._known = self._known.take(away_s <= self._rule.hysteresis_s)
 
-    def forget_before(self, run: int) -> None:
-        """Forget the runs before one."""
+    def forget_runs_before(self, run: int) -> None:
+        """Drop the targets of all runs with smaller numbers than this one."""
         self._known = self._known.take(self._known.replica >= run)
 
-    def _store(self, which: IntArray, part: AlertMemory) -> None:
+    def _write_rows(self, which: IntArray, part: AlertMemory) -> None:
         for name, values in part.columns.items():
             self._known.columns[name][..., which] = values
 
-    def _places(self, those: RunTicks) -> IntArray:
-        """Return the rows of targets, by run and number, all of them remembered from now on."""
+    def _rows_of_targets(self, those: RunTicks) -> IntArray:
+        """Return each target's row in the memory, by run and number, adding unknown ones first."""
         known = self._known.keys
-        index = last_position_in_run(known, those)
+        index = last_position_at_or_before(known, those)
         if len(known) and bool(((index >= 0) & (known.tick[index] == those.tick)).all()):
             return index
-        order = those.order()
+        order = those.sort_indices()
         every = union_of_instants([known, those if order is None else those.take(order)])
-        old, before = last_position_in_run(every, known), self._known
+        old, before = last_position_at_or_before(every, known), self._known
         self._known = AlertMemory.new(self._rule, every.run.copy(), every.tick.copy())
-        self._store(old, before)
-        return last_position_in_run(every, those)
+        self._write_rows(old, before)
+        return last_position_at_or_before(every, those)

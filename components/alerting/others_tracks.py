@@ -5,14 +5,14 @@ from typing import Self
 
 import numpy as np
 
-from components.alert_configuration.configuration import Deviations, largest
+from components.alert_configuration.configuration import Deviations, longest_axis_deviation
 from components.association.assignment import gate_threshold
-from components.estimation.batched import cholesky, distance_squared
+from components.estimation.batched import cholesky, mahalanobis_squared
 from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
-from components.messages.detections import SensorOffer, sensor_offers
+from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.state_tracks import COVARIANCE, StateTracks
-from components.navigation.errors import navigation_noise
+from components.navigation.errors import navigation_noise_deviations
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Context
@@ -20,7 +20,7 @@ from dsa_des.block.component import Context
 
 @dataclass(frozen=True)
 class OthersTracks:
-    """What is known of tracks to which no sensor on board has contributed."""
+    """Judges tracks made only on other platforms: which are the ownship, how uncertain all are."""
 
     sensors: frozenset[str]  # Those on other platforms
     own_gate_probability: float  # That a track of oneself is taken for it; 0 for never
@@ -28,22 +28,22 @@ class OthersTracks:
     navigation_m: tuple[float, float, float]  # Noise of one's own position, north, east, down
 
     @classmethod
-    def of(cls, context: Context, probability: float, intensity_m2_s3: float) -> Self:
-        """Return an instance for a block, from its producers' declared sensors and platforms."""
+    def from_context(cls, context: Context, probability: float, intensity_m2_s3: float) -> Self:
+        """Return a block's instance; producers' offers tell sensors that are on other platforms."""
         others = frozenset(
             name
-            for name, offer in sensor_offers(context.producers).items()
+            for name, offer in offers_of_fused_sensors(context.producers).items()
             if isinstance(offer, SensorOffer) and offer.platform not in ("", context.platform)
         )
         motion = ConstantVelocity(intensity_m2_s3)
-        return cls(others, probability, motion, navigation_noise(context)[0])
+        return cls(others, probability, motion, navigation_noise_deviations(context)[0])
 
     def are_of_others_only(self, tracks: StateTracks) -> BoolArray:
-        """Return which tracks are of other platforms' sensors alone."""
+        """Return a mask of the tracks to which only sensors on other platforms have contributed."""
         on_board = sum(1 << i for i, n in enumerate(tracks.sensors) if n not in self.sensors)
         return np.asarray(tracks.contributors & on_board == 0)
 
-    def judge_tracks(
+    def own_tracks_and_deviations(
         self,
         tracks: KeyedTable,
         ahead_s: FloatArray,
@@ -51,13 +51,16 @@ class OthersTracks:
         own_velocity: FloatArray,
         instant: IntArray,
     ) -> tuple[BoolArray, Deviations]:
-        """Return which tracks are of oneself, and how far all may be wrong as seen from oneself.
+        """Return a mask of the tracks that are the ownship itself, and the deviations of all tracks
+        predicted to their instants.
 
         All are carried on to some instants, with the motion's noise, and turned into the axes of
         one's own place (latitude, longitude in rad, height) and velocity (north, east, down). Of
         those in the gate at an instant the nearest is oneself: another one flies beside.
         """
-        state, spread = self.motion.predict(tracks.state, _matrices(tracks.covariance), ahead_s)
+        state, spread = self.motion.predict(
+            tracks.state, _full_covariances(tracks.covariance), ahead_s
+        )
         lat, lon, alt_m = own_place
         change = frame_change(tracks.origin, np.stack([np.degrees(lat), np.degrees(lon), alt_m]))
         state, spread = change.states(state), change.covariances(spread)
@@ -65,15 +68,15 @@ class OthersTracks:
             spread[i, i] += noise_m**2
         deviation = np.sqrt(np.stack([spread[i, i] for i in range(6)]))
         deviations = Deviations(
-            largest(deviation[1], deviation[0], spread[0, 1]),
+            longest_axis_deviation(deviation[1], deviation[0], spread[0, 1]),
             deviation[2],
-            largest(deviation[4], deviation[3], spread[3, 4]),
+            longest_axis_deviation(deviation[4], deviation[3], spread[3, 4]),
             deviation[5],
         )
         is_own = np.zeros(len(instant), dtype=bool)
         if self.own_gate_probability > 0.0 and len(instant):
             apart = np.concatenate([state[:3], state[3:] - own_velocity])
-            far = distance_squared(cholesky(spread), apart)
+            far = mahalanobis_squared(cholesky(spread), apart)
             order = np.lexsort((far, instant))
             first = np.ones(len(order), dtype=bool)
             first[1:] = instant[order][1:] != instant[order][:-1]
@@ -83,7 +86,7 @@ class OthersTracks:
         return is_own, deviations
 
 
-def _matrices(triangle: FloatArray) -> FloatArray:
+def _full_covariances(triangle: FloatArray) -> FloatArray:
     """Return covariances (6, 6, n) of their upper triangles (21, n)."""
     result = np.empty((6, 6, triangle.shape[1]))
     for (i, j), values in zip(COVARIANCE, triangle, strict=True):

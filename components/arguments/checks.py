@@ -32,7 +32,7 @@ LOWEST_ALTITUDE_M = -6e6
 
 
 def check_numbers(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as a float64 array, or say that it is not a number."""
+    """Return `value` as a float64 array; ValueError if it holds no numbers."""
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError) as error:
@@ -66,14 +66,14 @@ def check_not_negative(name: str, value: ArrayLike) -> FloatArray:
 
 
 def finite(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as float64, all of it finite, of any size; see also `squarable`."""
+    """Return `value` as float64, all of it finite, of any size; see also `check_squarable`."""
     array = check_numbers(name, value)
     refuse(name, array, ~np.isfinite(array), "be finite")
     return array
 
 
 def common_shape(**arrays: FloatArray) -> tuple[int, ...]:
-    """Return the shape that the named arrays broadcast to."""
+    """Return the shape to which named arrays broadcast; ValueError with their names if none."""
     shapes_of = {array.shape for array in arrays.values()}
     if len(shapes_of) == 1:  # the usual case, without NumPy's call
         return shapes_of.pop()
@@ -101,11 +101,11 @@ def broadcast_flat(**arrays: FloatArray) -> tuple[tuple[int, ...], list[FloatArr
 
 
 def unflatten(flat: NDArray[Any], shape: tuple[int, ...]) -> Any:
-    """Return a flat result in a shape; a 0-d result becomes a NumPy scalar."""
+    """Return a flat result reshaped, for the empty shape as a NumPy scalar."""
     return flat.reshape(shape)[()]
 
 
-def angle(name: str, value: ArrayLike) -> FloatArray:
+def check_angle_rad(name: str, value: ArrayLike) -> FloatArray:
     """Return an angle in radians as finite float64, safe to add to another one.
 
     Values beyond 1e15 rad carry no direction any more; they are reduced only so that sums of two
@@ -185,7 +185,7 @@ def check_swerling_model(value: object) -> str:
 
 
 def contiguous(name: str, value: ArrayLike) -> FloatArray:
-    """Turn an argument into a C-contiguous array of doubles.
+    """Return an argument as a C-contiguous float64 array; ValueError if it holds no numbers.
 
     Contiguous because NumPy's loops over sin, cos or arctan2 may take another code path, with
     other last bits, when they step through memory with a stride.
@@ -203,7 +203,7 @@ def require_between(name: str, array: FloatArray, low: float, high: float, allow
     raise ValueError(f"{name} is {array.reshape(-1)[first]}{place}: it must {allowed}")
 
 
-def squarable(name: str, value: ArrayLike) -> FloatArray:
+def check_squarable(name: str, value: ArrayLike) -> FloatArray:
     """Return the argument as a contiguous array of doubles, finite and within ±1e150.
 
     Stricter than `finite`: for what is squared on the way, so that the square fits as well.
@@ -245,7 +245,7 @@ def broadcast_results(shape: tuple[int, ...], *arrays: FloatArray) -> tuple[Floa
     return tuple(results)
 
 
-def positions(
+def check_positions(
     own_lat_deg: ArrayLike,
     own_lon_deg: ArrayLike,
     own_alt_m: ArrayLike,

@@ -15,7 +15,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 @lru_cache(maxsize=64)
 def gate_threshold(probability: float, size: int) -> float:
-    """Return the squared Mahalanobis distance that holds detections with a probability."""
+    """Return the squared Mahalanobis gate of a detection of `size` quantities at a probability."""
     low, high = 0.0, 1.0
     while 1.0 - probability < _chi_square_survival(high, size):
         high *= 2.0
@@ -30,7 +30,7 @@ def gate_threshold(probability: float, size: int) -> float:
 
 
 def _chi_square_survival(distance: float, size: int) -> float:
-    """Return the probability of a larger squared distance (Abramowitz, Stegun, 26.4.4 and 5)."""
+    """Return a chi-square variable's probability (`size` degrees of freedom) of exceeding this."""
     half = 0.5 * distance
     total = 0.0 if size % 2 == 0 else math.erfc(math.sqrt(half))
     term = math.exp(-half) * (1.0 if size % 2 == 0 else math.sqrt(half) / math.gamma(1.5))
@@ -42,16 +42,16 @@ def _chi_square_survival(distance: float, size: int) -> float:
     return total
 
 
-def alone(track: IntArray, detection: IntArray) -> BoolArray:
-    """Return which pairs are the only one of both their track and their detection."""
+def is_only_pair_of_both(track: IntArray, detection: IntArray) -> BoolArray:
+    """Return whether each pair is the only one both of its track and of its detection."""
     if len(track) == 0:
         return np.zeros(0, dtype=bool)
     tracks, detections = np.bincount(track), np.bincount(detection)
     return np.asarray((tracks[track] == 1) & (detections[detection] == 1))
 
 
-def labels(track: IntArray, detection: IntArray) -> IntArray:
-    """Return the cluster of each pair: its least track number."""
+def cluster_labels(track: IntArray, detection: IntArray) -> IntArray:
+    """Return each pair's label: the least track number in its cluster of tracks and detections."""
     if len(track) == 0:
         return np.zeros(0, dtype=np.int64)
     of_track = np.arange(int(track.max()) + 1)
@@ -65,8 +65,8 @@ def labels(track: IntArray, detection: IntArray) -> IntArray:
         of_track = lower
 
 
-def groups(label: IntArray) -> list[IntArray]:
-    """Return the pairs of each cluster, clusters by label, pairs in their own order."""
+def group_by_label(label: IntArray) -> list[IntArray]:
+    """Return for each cluster the indices of its pairs, ascending; clusters are sorted by label."""
     if len(label) == 0:
         return []
     order = np.argsort(label, kind="stable")
@@ -74,10 +74,10 @@ def groups(label: IntArray) -> list[IntArray]:
     return np.split(order, cuts)
 
 
-def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
-    """Return pairs by repeatedly taking the nearest track and detection that are left."""
-    taken = [np.flatnonzero(alone(track, detection))]
-    left = np.flatnonzero(~alone(track, detection))
+def nearest_pairs(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
+    """Return pairs chosen greedily (indices): repeatedly the closest free track and detection."""
+    taken = [np.flatnonzero(is_only_pair_of_both(track, detection))]
+    left = np.flatnonzero(~is_only_pair_of_both(track, detection))
     left = left[np.argsort(distance[left], kind="stable")]
     while len(left):
         # The first pair of its track and of its detection is taken whatever the others are.
@@ -91,15 +91,15 @@ def nearest(track: IntArray, detection: IntArray, distance: FloatArray) -> IntAr
     return np.sort(np.concatenate(taken))
 
 
-def global_nearest(
+def global_nearest_pairs(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
-    """Return the pairs with the least sum of distances plus a price for each track left out."""
-    single = alone(track, detection)
+    """Return the pairs (indices) of least total distance, plus `missing` per unpaired track."""
+    single = is_only_pair_of_both(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)
     price = np.broadcast_to(missing, distance.shape)
-    for part in groups(labels(track[left], detection[left])):
+    for part in group_by_label(cluster_labels(track[left], detection[left])):
         pairs = left[part]
         taken.append(
             pairs[_solve_assignment(track[pairs], detection[pairs], distance[pairs], price[pairs])]

@@ -12,7 +12,7 @@ AES 50 (2014).
 
 import numpy as np
 
-from components.association.assignment import groups, labels
+from components.association.assignment import cluster_labels, group_by_label
 from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Detections in a cluster up to which marginals are exact: a sum over 2^10 sets for each track.
@@ -25,7 +25,7 @@ _MOST_ROUNDS = 10_000
 def marginals(
     track: IntArray, detection: IntArray, weight: FloatArray, exact_up_to: int = EXACT_UP_TO
 ) -> FloatArray:
-    """Return the probability of each pair; what a track's pairs leave to 1 is that of a miss."""
+    """Return each pair's joint association probability; a track's lack to 1 is that of a miss."""
     result = np.empty(len(track))
     if len(track) == 0:
         return result
@@ -37,7 +37,7 @@ def marginals(
     total = 1.0 + np.bincount(track[simple], weights=weight[simple], minlength=len(mixed_up))
     result[simple] = weight[simple] / total[track[simple]]
     left = np.flatnonzero(~simple)
-    for part in groups(labels(track[left], detection[left])):
+    for part in group_by_label(cluster_labels(track[left], detection[left])):
         pairs = left[part]
         tracks, row = np.unique(track[pairs], return_inverse=True)
         detections, column = np.unique(detection[pairs], return_inverse=True)
@@ -49,7 +49,9 @@ def marginals(
 
 
 def exact_marginals(weights: FloatArray) -> FloatArray:
-    """Return exact marginals of one cluster."""
+    """Return exact probabilities of the pairs of one cluster, (tracks, detections), from weights
+    relative to a miss, 0 for no pair.
+    """
     many, count = weights.shape
     sets = 1 << count
     free = [np.flatnonzero((np.arange(sets) >> j & 1) == 0) for j in range(count)]
@@ -76,7 +78,8 @@ def exact_marginals(weights: FloatArray) -> FloatArray:
 
 
 def propagate_beliefs(weights: FloatArray) -> FloatArray:
-    """Return approximate marginals of one cluster, by belief propagation.
+    """Return approximate probabilities of the pairs of one cluster, (tracks, detections), by belief
+    propagation.
 
     Within 0.1 of exact ones in most clusters; where several tracks share the same detections and
     misses are rare it is too sure of one way round.

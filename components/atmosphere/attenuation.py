@@ -18,7 +18,7 @@ from components.arguments.checks import (
     refuse,
     unflatten,
 )
-from components.atmosphere.standard_atmosphere import columns, rows
+from components.atmosphere.standard_atmosphere import read_csv_columns, read_csv_rows
 from dsa_des.arrays.types import FloatArray
 
 HIGHEST_FREQUENCY_HZ = 1e12
@@ -68,7 +68,11 @@ def gas_specific_attenuation(
         "exert a partial pressure below the barometric pressure",
     )
     air = (frequency, dry_pressure, vapour_pressure, 300.0 / temperature)
-    refractivity = _oxygen_lines(*air) + _dry_continuum(*air) + _water_vapour_lines(*air)
+    refractivity = (
+        _oxygen_refractivity(*air)
+        + _dry_continuum_refractivity(*air)
+        + _water_vapour_refractivity(*air)
+    )
     return unflatten(0.1820 * frequency * refractivity, shape)
 
 
@@ -76,8 +80,10 @@ def gas_specific_attenuation(
 # last bits do not depend on how many elements there are.
 
 
-def _oxygen_lines(f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArray) -> FloatArray:
-    table = columns("oxygen_lines")
+def _oxygen_refractivity(
+    f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArray
+) -> FloatArray:
+    table = read_csv_columns("oxygen_lines")
     theta_08 = np.power(theta, 0.8)
     total = np.zeros_like(f)
     names = ("f0_ghz", "a1", "a2", "a3", "a4", "a5", "a6")
@@ -94,7 +100,9 @@ def _oxygen_lines(f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArray
     return total
 
 
-def _dry_continuum(f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArray) -> FloatArray:
+def _dry_continuum_refractivity(
+    f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArray
+) -> FloatArray:
     # d·(1 + (f/d)²) written as d + f²/d would divide by 0 in a vacuum; d/(d² + f²) does not.
     d = 5.6e-4 * (p + e) * np.power(theta, 0.8)
     debye = 6.14e-5 * d / (d * d + f * f)
@@ -102,10 +110,10 @@ def _dry_continuum(f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArra
     return f * p * theta * theta * (debye + nitrogen)
 
 
-def _water_vapour_lines(
+def _water_vapour_refractivity(
     f: FloatArray, p: FloatArray, e: FloatArray, theta: FloatArray
 ) -> FloatArray:
-    table = columns("water_vapour_lines")
+    table = read_csv_columns("water_vapour_lines")
     theta_35 = np.power(theta, 3.5)
     total = np.zeros_like(f)
     names = ("f0_ghz", "b1", "b2", "b3", "b4", "b5", "b6")
@@ -133,8 +141,12 @@ class RainCoefficients:
     k_vertical: float
     alpha_vertical: float
 
-    def specific_attenuation(self, rain_rate_mm_h: FloatArray, balance: FloatArray) -> FloatArray:
-        """Return γ in dB/km for flat arrays of checked rain rates and polarisation balances."""
+    def specific_attenuation_db_km(
+        self, rain_rate_mm_h: FloatArray, balance: FloatArray
+    ) -> FloatArray:
+        """Return the attenuation γ in dB/km, one way, for flat arrays of rain rates and of
+        polarisation balances (cos 2τ), unchecked.
+        """
         horizontal = 0.5 * (1.0 + balance) * self.k_horizontal
         vertical = 0.5 * (1.0 - balance) * self.k_vertical
         k = horizontal + vertical
@@ -156,7 +168,7 @@ def rain_coefficients(frequency_hz: float) -> RainCoefficients:
     """
     decades = math.log10(float(check_frequency(float(frequency_hz), HIGHEST_FREQUENCY_HZ)))
     value = {"k_horizontal": 0.0, "k_vertical": 0.0, "alpha_horizontal": 0.0, "alpha_vertical": 0.0}
-    for row in rows("rain_coefficients"):
+    for row in read_csv_rows("rain_coefficients"):
         a, b = float(row["a"]), float(row["b"])
         if row["term"] == "gauss":
             value[row["quantity"]] += a * math.exp(-(((decades - b) / float(row["c"])) ** 2))
@@ -222,7 +234,7 @@ def rain_specific_attenuation(
         ),
     )
     balance = np.cos(elevation) ** 2 * polarisation_balance(polarisation)
-    return unflatten(coefficients.specific_attenuation(rate, balance), shape)
+    return unflatten(coefficients.specific_attenuation_db_km(rate, balance), shape)
 
 
 HIGHEST_FREQUENCY_IN_FOG_HZ = 200e9

@@ -40,8 +40,8 @@ _ALONG, _ALONG_WEIGHTS = np.polynomial.legendre.leggauss(5)
 _HPA_PER_ATM = 1013.25
 
 
-def check_band(band: str) -> tuple[float, float]:
-    """Return a band's wavelengths (µm); ValueError with those there are if none has that name."""
+def band_wavelengths_um(band: str) -> tuple[float, float]:
+    """Return a band's shortest and longest wavelength, µm; ValueError for an unknown name."""
     if band not in BANDS:
         raise ValueError(f"band is {band!r}: it must be one of {', '.join(BANDS)}")
     return BANDS[band]
@@ -53,7 +53,7 @@ def precipitable_water_mm(
     target_alt_m: ArrayLike,
     sea_level_vapour_density_g_m3: ArrayLike = SEA_LEVEL_VAPOUR_DENSITY_G_M3,
 ) -> Any:
-    """Return the water vapour along a straight path, as the depth of the water it would make.
+    """Return the water vapour along a straight path, in mm of liquid water.
 
     Its density falls by e every 2 km (Recommendation ITU-R P.835); along the path altitude grows
     evenly.
@@ -81,7 +81,7 @@ def precipitable_water_mm(
 
 
 def mid_wave_transmission(water_mm: ArrayLike) -> Any:
-    """Return the share of 3-5 µm light that water vapour leaves, the mean over the band.
+    """Return 3-5 µm transmission (0 to 1) through so much water vapour, a mean over the band.
 
     Parameters
     ----------
@@ -139,10 +139,12 @@ def continuum_per_km(
         temperature_k=positive("temperature_k", temperature_k),
         pressure_hpa=positive("pressure_hpa", pressure_hpa),
     )
-    return unflatten(_continuum(wavelength, density, temperature, pressure), shape)
+    return unflatten(
+        _water_vapour_continuum_per_km(wavelength, density, temperature, pressure), shape
+    )
 
 
-def _continuum(
+def _water_vapour_continuum_per_km(
     wavelength_um: Any, density: FloatArray, temperature: FloatArray, pressure: FloatArray
 ) -> FloatArray:
     wavenumber = 1e4 / wavelength_um
@@ -161,7 +163,7 @@ def long_wave_transmission(
     target_alt_m: ArrayLike,
     sea_level_vapour_density_g_m3: float = SEA_LEVEL_VAPOUR_DENSITY_G_M3,
 ) -> Any:
-    """Return the share of 8-12 µm light that clear air leaves, the mean over the band.
+    """Return the 8-12 µm transmission (0 to 1) of clear air, the mean over the band.
 
     The water vapour continuum (`continuum_per_km`) in the standard atmosphere, whose vapour
     density at sea level is given, along a straight path on which altitude grows evenly. Lines of
@@ -182,7 +184,11 @@ def long_wave_transmission(
             altitude, sea_level_vapour_density_g_m3=sea_level_vapour_density_g_m3
         )
         for row, wavelength in enumerate(wavelengths):
-            depth[row] += 0.5 * weight * _continuum(wavelength, density, temperature, pressure)
+            depth[row] += (
+                0.5
+                * weight
+                * _water_vapour_continuum_per_km(wavelength, density, temperature, pressure)
+            )
     with np.errstate(under="ignore"):
         left = np.exp(-depth * (1e-3 * distance))
     mean = np.zeros_like(distance)
@@ -191,8 +197,8 @@ def long_wave_transmission(
     return unflatten(mean, shape)
 
 
-def haze_share(visibility_m: ArrayLike, band: str) -> Any:
-    """Return the extinction of haze or fog in a band, as a share of that of visible light.
+def haze_extinction_ratio(visibility_m: ArrayLike, band: str) -> Any:
+    """Return the extinction by haze or fog in an infrared band over that of visible light.
 
     (λ / 0.55 µm)^-q at the band's middle, with q by the visibility V in km: 1.6 above 50, 1.3 from
     6, 0.16 V + 0.34 from 1, V - 0.5 from 0.5, and 0 below: thick fog takes the same from all light.
@@ -213,14 +219,14 @@ def haze_share(visibility_m: ArrayLike, band: str) -> Any:
     Korevaar, "Comparison of laser beam propagation at 785 nm and 1550 nm in fog and haze", Proc.
     SPIE 4214, 2001. It was fitted up to 1.55 µm: what it says of 4 and 10 µm is extrapolated.
     """
-    low, high = check_band(band)
-    return haze_share_at(visibility_m, 0.5 * (low + high))
+    low, high = band_wavelengths_um(band)
+    return haze_extinction_ratio_at(visibility_m, 0.5 * (low + high))
 
 
-def haze_share_at(visibility_m: ArrayLike, wavelength_um: float) -> Any:
-    """Return the extinction of haze or fog at a wavelength, as a share of that of visible light.
+def haze_extinction_ratio_at(visibility_m: ArrayLike, wavelength_um: float) -> Any:
+    """Return the extinction by haze or fog at one wavelength, divided by that of visible light.
 
-    The law of `haze_share`; for lasers, up to 1.55 µm as it was fitted.
+    The law of `haze_extinction_ratio`; for lasers, up to 1.55 µm as it was fitted.
     """
     visibility = np.asarray(visibility_m, dtype=np.float64)
     if not np.all(visibility > 0.0):
@@ -240,8 +246,8 @@ def band_extinction_per_m(
     `haze_visibility_m` is that in the haze or fog alone; large drops of rain take the same from all
     light.
     """
-    check_band(band)
+    band_wavelengths_um(band)
     if haze_visibility_m is None:
         return rain_extinction_per_m
-    share = float(haze_share(haze_visibility_m, band))
+    share = float(haze_extinction_ratio(haze_visibility_m, band))
     return rain_extinction_per_m + KOSCHMIEDER / haze_visibility_m * share

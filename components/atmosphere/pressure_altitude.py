@@ -52,14 +52,17 @@ class Air:
     geoid_m: float = 0.0
 
     def pressure_altitude_m(self, height_m: ArrayLike) -> Any:
-        """Return what altimeters read at heights from -5 to 30 km, m."""
+        """Return the pressure altitude, m, at heights of -5 to 30 km above the ellipsoid."""
         height = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m") - self.geoid_m
-        return _STANDARD.height_m(self._column.drop(height) - self._qnh_log_ratio)
+        return _STANDARD.height_m(self._column.log_pressure_drop(height) - self._qnh_log_ratio)
 
     def height_m(self, altitude_m: ArrayLike) -> Any:
-        """Return the heights at which altimeters read some altitudes, m; its inverse."""
+        """Return heights above the ellipsoid, m, where altimeters read these pressure altitudes."""
         altitude = check_within("altitude_m", altitude_m, LOWEST_M, HIGHEST_M, "m")
-        return self._column.height_m(_STANDARD.drop(altitude) + self._qnh_log_ratio) + self.geoid_m
+        return (
+            self._column.height_m(_STANDARD.log_pressure_drop(altitude) + self._qnh_log_ratio)
+            + self.geoid_m
+        )
 
     @property
     def _qnh_log_ratio(self) -> float:
@@ -70,15 +73,15 @@ class Air:
         off_k = self.offset_k
         known = {h: c + _ZERO_C_K for h, c in self.profile_c} or {0.0: _SEA_LEVEL_K + off_k}
         heights, kelvin = np.array(sorted(known.items())).T
-        off = kelvin - _standard_k(heights)
+        off = kelvin - _standard_temperature_k(heights)
         every = np.union1d(heights, [0.0, _TROPOPAUSE_M])
-        outside = _standard_k(every) + np.interp(every, heights, off)
+        outside = _standard_temperature_k(every) + np.interp(every, heights, off)
         inside = (every >= heights[0]) & (every <= heights[-1])
         return _AirColumn(every, np.where(inside, np.interp(every, heights, kelvin), outside))
 
 
 def scene_air(sections: Mapping[str, Any]) -> Air | None:
-    """Return a scene's air, of its ``[weather]`` and ``[terrain]``; None for the standard's."""
+    """Return the air of a scene's ``weather`` and ``terrain``; None for the standard atmosphere."""
     weather, terrain = sections.get("weather"), sections.get("terrain")
     air = Air(geoid_m=0.0 if terrain is None else terrain.geoid_undulation_m)
     if weather is not None:
@@ -88,7 +91,7 @@ def scene_air(sections: Mapping[str, Any]) -> Air | None:
 
 
 class _AirColumn:
-    """Air whose temperature is known at rising heights, 0 and 11 km among them, even in between.
+    """Air with temperature given at rising heights, among them 0 and 11 km, linear between.
 
     It falls by the standard's lapse rate below the lowest, and is the same above the highest.
     """
@@ -99,25 +102,27 @@ class _AirColumn:
         lapse = -np.diff(kelvin) / np.diff(heights_m)
         self._lapse_k_m = np.concatenate([[_LAPSE_K_M], lapse, [0.0]])
         layer = np.arange(1, len(heights_m))
-        drops = np.concatenate([[0.0], np.cumsum(self._pressure_drop(layer, np.diff(heights_m)))])
+        drops = np.concatenate(
+            [[0.0], np.cumsum(self._log_drop_in_layer(layer, np.diff(heights_m)))]
+        )
         self._from_drop = drops - drops[np.searchsorted(heights_m, 0.0)]
         self._base_drop = self._from_drop[below]
 
-    def drop(self, height_m: FloatArray) -> FloatArray:
-        """Return by how much the logarithm of pressure falls from sea level to heights."""
+    def log_pressure_drop(self, height_m: FloatArray) -> FloatArray:
+        """Return by how much the natural log of pressure falls from sea level to these heights."""
         layer = np.searchsorted(self._from_m, height_m, side="right")
         above_m = height_m - self._base_m[layer]
-        return np.asarray(self._base_drop[layer] + self._pressure_drop(layer, above_m))
+        return np.asarray(self._base_drop[layer] + self._log_drop_in_layer(layer, above_m))
 
-    def _pressure_drop(self, layer: IntArray, height_m: FloatArray) -> FloatArray:
-        """Return the drop of log pressure from the bases of layers to heights above them."""
+    def _log_drop_in_layer(self, layer: IntArray, height_m: FloatArray) -> FloatArray:
+        """Return the fall of the log of pressure from each layer's base to `height_m` above it."""
         lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]
         even = np.where(lapse == 0.0, 1.0, lapse)
         falling = -_HYDROSTATIC_K_M / even * np.log1p(-lapse * height_m / kelvin)
         return np.where(lapse == 0.0, _HYDROSTATIC_K_M * height_m / kelvin, falling)
 
     def height_m(self, drop: FloatArray) -> FloatArray:
-        """Return the heights at which the logarithm of pressure fell by so much."""
+        """Return heights above sea level, m, over which the logarithm of pressure falls so much."""
         layer = np.searchsorted(self._from_drop, drop, side="right")
         lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]
         share = (drop - self._base_drop[layer]) / _HYDROSTATIC_K_M
@@ -126,8 +131,10 @@ class _AirColumn:
         return np.asarray(self._base_m[layer] + np.where(lapse == 0.0, share * kelvin, falling))
 
 
-def _standard_k(height_m: FloatArray) -> FloatArray:
+def _standard_temperature_k(height_m: FloatArray) -> FloatArray:
     return _SEA_LEVEL_K - _LAPSE_K_M * np.minimum(height_m, _TROPOPAUSE_M)
 
 
-_STANDARD = _AirColumn(np.array([0.0, _TROPOPAUSE_M]), _standard_k(np.array([0.0, _TROPOPAUSE_M])))
+_STANDARD = _AirColumn(
+    np.array([0.0, _TROPOPAUSE_M]), _standard_temperature_k(np.array([0.0, _TROPOPAUSE_M]))
+)

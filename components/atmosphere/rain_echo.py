@@ -55,7 +55,7 @@ def rain_volume_m3(
     lowest_m: float,
     highest_m: float,
 ) -> Any:
-    """Return the volume of rain in the range cell of a target at which the beam points, m³.
+    """Return the volume of rain, m³, in the radar cell around a target at which the beam points.
 
     Weighted by the two-way gain of a beam of one-way half-power widths, as rain counts beside a
     target amid the beam. It rains from `lowest_m` (-inf for rain that nothing ends below) to
@@ -79,7 +79,9 @@ def rain_volume_m3(
     solid = math.pi * azimuth_beamwidth_rad * elevation_beamwidth_rad / (8.0 * _LN_2)
     spread = distance * np.cos(elevation) * elevation_beamwidth_rad / math.sqrt(16.0 * _LN_2)
     spread = np.maximum(spread, 1e-9)
-    share = _share_below((highest_m - height) / spread) - _share_below((lowest_m - height) / spread)
+    share = _normal_share_below((highest_m - height) / spread) - _normal_share_below(
+        (lowest_m - height) / spread
+    )
     volume = distance * distance * solid * range_resolution_m * np.maximum(share, 0.0)
     return unflatten(volume, shape)
 
@@ -92,7 +94,7 @@ def rain_shell_m3(
     lowest_m: float,
     highest_m: float,
 ) -> Any:
-    """Return the volume of rain at a slant range in all directions, which sidelobes meet, m³.
+    """Return the rain volume, m³, of the whole shell at a slant range, which sidelobes light up.
 
     2 pi R ΔR times the height of the shell in which it rains (Archimedes).
     """
@@ -113,10 +115,10 @@ def fall_speed_m_s(rain_rate_mm_h: ArrayLike) -> Any:
     return (2.6 * (200.0 * rate**1.6) ** 0.107)[()]
 
 
-def rain_spread_m_s(
+def rain_velocity_deviation_m_s(
     range_m: ArrayLike, elevation_rad: ArrayLike, elevation_beamwidth_rad: float
 ) -> Any:
-    """Return the standard deviation of the rain's own range rates in a cell, m/s.
+    """Return the standard deviation of the range rates of rain within a radar cell, m/s.
 
     Shear of the wind over the beam's height, 0.42 · 4 m/s/km · R · θ_el and at most 6 m/s,
     turbulence of 1 m/s and 1 m/s · sin(elevation) of the drops' fall (Nathanson, chapter 6).
@@ -131,8 +133,8 @@ def rain_spread_m_s(
     return unflatten(np.sqrt(shear**2 + _TURBULENCE_M_S**2 + fall**2), shape)
 
 
-def _share_below(deviations: FloatArray) -> FloatArray:
-    """Return the share of a normal distribution that lies so many deviations above it or lower."""
+def _normal_share_below(deviations: FloatArray) -> FloatArray:
+    """Return the share (0 to 1) of a normal distribution below so many standard deviations."""
     from scipy.special import ndtr
 
     share: FloatArray = ndtr(deviations)

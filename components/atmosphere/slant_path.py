@@ -195,12 +195,14 @@ def one_way_attenuation_db(
     low, high = np.minimum(own, target), np.maximum(own, target)
     mean_db_km = np.zeros_like(distance)
     if table.gas is not None:
-        mean_db_km += _mean_gas(low, high, *table.gas)
+        mean_db_km += _mean_gas_attenuation_db_km(low, high, *table.gas)
     if table.rain is not None:
-        share = share_between(low, high, -np.inf, table.rain_height_m)
-        mean_db_km += share * _rain(distance, high - low, table.rain, table)
+        share = share_of_path_between(low, high, -np.inf, table.rain_height_m)
+        mean_db_km += share * _rain_attenuation_db_km(distance, high - low, table.rain, table)
     if table.fog_db_km > 0.0:
-        mean_db_km += table.fog_db_km * share_between(low, high, table.fog_base_m, table.fog_top_m)
+        mean_db_km += table.fog_db_km * share_of_path_between(
+            low, high, table.fog_base_m, table.fog_top_m
+        )
     return unflatten(mean_db_km * (distance * 1e-3), shape)
 
 
@@ -216,12 +218,12 @@ def two_way_transmission(one_way_db: ArrayLike) -> Any:
     return unflatten(np.where(gone, 0.0, factor), shape)
 
 
-def _mean_gas(
+def _mean_gas_attenuation_db_km(
     low: FloatArray, high: FloatArray, gas: FloatArray, slope: FloatArray, total: FloatArray
 ) -> FloatArray:
     last = len(total) - 2
-    i, t = _node(low, last)
-    j, s = _node(high, last)
+    i, t = _node_below(low, last)
+    j, s = _node_below(high, last)
     at_i, slope_i = gas.take(i), slope.take(i)
     in_one_step = at_i + slope_i * (0.5 * (t + s))
     to_next_node = (1.0 - t) * (at_i + slope_i * (0.5 * (1.0 + t)))
@@ -233,15 +235,17 @@ def _mean_gas(
     return np.where(same, in_one_step, (to_next_node + whole_steps + from_last_node) / steps)
 
 
-def _node(altitude_m: FloatArray, last: int) -> tuple[Any, FloatArray]:
-    """Return the number of the node below and how many steps the altitude is above it."""
+def _node_below(altitude_m: FloatArray, last: int) -> tuple[Any, FloatArray]:
+    """Return the table's node at or below each altitude (index), and the steps above that node."""
     x = (altitude_m - BOTTOM_M) * (1.0 / STEP_M)
     below = np.minimum(np.maximum(np.floor(x), 0.0), float(last))
     return below.astype(np.intp), x - below
 
 
-def share_between(low: FloatArray, high: FloatArray, bottom: float, top: float) -> FloatArray:
-    """Return which share of the path from `low` to `high` lies between two altitudes."""
+def share_of_path_between(
+    low: FloatArray, high: FloatArray, bottom: float, top: float
+) -> FloatArray:
+    """Return the share (0 to 1) of a path from altitude `low` to `high` in `bottom` to `top`."""
     span = high - low
     level = span == 0.0
     inside = np.maximum(np.minimum(high, top) - np.maximum(low, bottom), 0.0)
@@ -249,20 +253,21 @@ def share_between(low: FloatArray, high: FloatArray, bottom: float, top: float) 
     return np.where(level, level_share, inside / np.where(level, 1.0, span))
 
 
-def _rain(
+def _rain_attenuation_db_km(
     distance: FloatArray, climb: FloatArray, rain: RainCoefficients, table: AttenuationTable
 ) -> FloatArray:
     if table.rain_balance == 0.0:
-        return rain.specific_attenuation(np.full(1, table.rain_rate_mm_h), np.zeros(1))
+        return rain.specific_attenuation_db_km(np.full(1, table.rain_rate_mm_h), np.zeros(1))
     # A climb longer than the path (another frame's altitudes) counts as vertical.
     sine = np.minimum(climb, distance) / np.where(distance > 0.0, distance, 1.0)
     cosine_squared = (1.0 - sine) * (1.0 + sine)
     rate = np.full_like(distance, table.rain_rate_mm_h)
-    return rain.specific_attenuation(rate, cosine_squared * table.rain_balance)
+    return rain.specific_attenuation_db_km(rate, cosine_squared * table.rain_balance)
 
 
 def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: ArrayLike) -> Any:
-    """Return the range at which a radar has the SNR that it has at `clear_range_m` in a vacuum.
+    """Return the range at which a radar in uniformly attenuating air has the same SNR as at
+    `clear_range_m` without attenuation.
 
     Parameters
     ----------

@@ -17,16 +17,16 @@ _FOLDER = Path(__file__).parent / "data"
 
 
 @cache
-def rows(name: str) -> tuple[dict[str, str], ...]:
+def read_csv_rows(name: str) -> tuple[dict[str, str], ...]:
     """Return the rows of ``data/<name>.csv`` as dictionaries; lines starting with # are notes."""
     with open(_FOLDER / f"{name}.csv", encoding="utf-8", newline="") as file:
         return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 @cache
-def columns(name: str) -> dict[str, FloatArray]:
+def read_csv_columns(name: str) -> dict[str, FloatArray]:
     """Return the columns of ``data/<name>.csv`` as read-only float64 arrays."""
-    table = rows(name)
+    table = read_csv_rows(name)
     result = {key: np.array([float(row[key]) for row in table]) for key in table[0]}
     for column in result.values():
         column.flags.writeable = False
@@ -49,7 +49,7 @@ def standard_atmosphere(
     *,
     sea_level_vapour_density_g_m3: ArrayLike = SEA_LEVEL_VAPOUR_DENSITY_G_M3,
 ) -> tuple[Any, Any, Any]:
-    """Return pressure, temperature and water vapour density of the reference atmosphere.
+    """Return the mean global pressure (hPa), temperature (K) and water vapour density (g/m³).
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def standard_atmosphere(
     )
     height_km = altitude * 1e-3
     geopotential_km = _EARTH_RADIUS_KM * height_km / (_EARTH_RADIUS_KM + height_km)
-    layers = columns("standard_atmosphere")
+    layers = read_csv_columns("standard_atmosphere")
     base_km = layers["base_geopotential_km"]
     layer = np.maximum(np.searchsorted(base_km, geopotential_km, side="left") - 1, 0)
     above_base_km = geopotential_km - base_km[layer]

@@ -97,7 +97,7 @@ def rain_visibility_m(rain_rate_mm_h: ArrayLike) -> Any:
 
 
 def combined_visibility_m(*visibility_m: ArrayLike) -> Any:
-    """Return the visibility through several kinds of obscuration at once.
+    """Return the visibility through several obscurations at once: their extinctions add.
 
     Extinctions add, so the reciprocals of the visibilities do.
 

@@ -16,7 +16,7 @@ _SCENE = "thesis"
 
 
 def measure_calls(calls: int, repeats: int) -> dict[str, Any]:
-    """Return percentiles of the time of a call, us, over all calls of all repetitions.
+    """Return counts and percentiles of wall and CPU time, µs, of embedding interface calls.
 
     Four intruders fly towards and past the ownship; radar, EO and IR are all due at every call,
     which is the most that a call can have to do. Wall time is what the host waits; processor time
@@ -26,7 +26,7 @@ def measure_calls(calls: int, repeats: int) -> dict[str, Any]:
     """
     scene = SCENES / f"{_SCENE}.toml"
     traffic: Any = Simulation(load_scene(scene)).components["traffic"]
-    flights = [_states(traffic, float(k)) for k in range(calls)]
+    flights = [_host_inputs(traffic, float(k)) for k in range(calls)]
     wall, cpu, first, machine = [], [], [], []
     detections = 0
     for _ in range(repeats):
@@ -44,7 +44,7 @@ def measure_calls(calls: int, repeats: int) -> dict[str, Any]:
             cpu.append(spent / 1000.0)
             if k == 0:
                 first.append(waited / 1000.0)
-            machine.append(_fixed_work() / 1000.0)
+            machine.append(_fixed_work_ns() / 1000.0)
     return {
         "scene": "embed",
         "what": "4 intruders, 3 sensors, all due at every call",
@@ -60,8 +60,8 @@ def measure_calls(calls: int, repeats: int) -> dict[str, Any]:
     }
 
 
-def _fixed_work() -> int:
-    """Return the time of some hundred calls of NumPy on a few numbers, ns."""
+def _fixed_work_ns() -> int:
+    """Run 500 small NumPy additions and return the time they took, ns."""
     few = np.arange(4.0)
     started = time.perf_counter_ns()
     for _ in range(500):
@@ -69,8 +69,8 @@ def _fixed_work() -> int:
     return time.perf_counter_ns() - started
 
 
-def _states(traffic: Any, time_s: float) -> tuple[Any, Any, Any, Any]:
-    """Return what a host hands in at a time, from the scene's own traffic."""
+def _host_inputs(traffic: Any, time_s: float) -> tuple[Any, Any, Any, Any]:
+    """Return what a host passes to a call at a time: own position and attitude, then targets'."""
     time_of = np.array([time_s])
     states = [traffic.own.at(time_of), traffic.targets.at(time_of)]
     lla = [np.stack([np.radians(s.lat_deg), np.radians(s.lon_deg), s.alt_m], -1) for s in states]

@@ -24,12 +24,12 @@ def main(arguments: list[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     if options.kind != "calls":  # a host has all of its machine
         pin_to_one_processor()
-    say_json(_measure_alone(options.kind, options.name, options.quick, options.repeats))
+    say_json(_measure_by_kind(options.kind, options.name, options.quick, options.repeats))
     return 0
 
 
-def _measure_alone(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
-    """Measure with what the kind needs and nothing else in memory."""
+def _measure_by_kind(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
+    """Return one benchmark's row, importing only what its kind needs, so that memory is its own."""
     if kind == "scenes":
         from components.benchmark import scenes
 

@@ -13,11 +13,16 @@ from typing import Any
 import numpy as np
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.levels import due_levels, violation_times_s
-from components.benchmark.scenes import SCENES, replicas_of, scene_of, select_cases
-from components.benchmark.time_shares import shares_by_block
-from components.benchmark.track_updates import LOOKS, plain_updates, stone_soup_updates, updates
-from components.examples import folder
+from components.alerting.levels import due_and_early_due_levels, violation_times_s
+from components.benchmark.scenes import SCENES, load_case_scene, random_phase_replicas, select_cases
+from components.benchmark.time_shares import cpu_shares_by_block
+from components.benchmark.track_updates import (
+    LOOKS,
+    prepare_plain_updates,
+    prepare_stone_soup_updates,
+    prepare_tracker_updates,
+)
+from components.examples import configs_folder
 from components.guidance.bands import guidance_of_many
 from components.guidance.manoeuvre_kinds import KINDS
 from components.guidance.regions import GuidedIntruders
@@ -49,8 +54,8 @@ _DRAWN = {
 _ALL_AT_ONCE = 128
 
 
-def other_flights(count: int) -> list[Replica]:
-    """Return replicas in which both intruders and the ownship fly otherwise."""
+def random_flight_replicas(count: int) -> list[Replica]:
+    """Return replicas with both intruders' random parameters and the own speed drawn anew."""
     stream = Streams(1).stream("benchmark", "flights")
     result = []
     for number in range(count):
@@ -65,9 +70,11 @@ def other_flights(count: int) -> list[Replica]:
     return result
 
 
-def _runs_of(scene: Scene, wanted: dict[str, Any]) -> Callable[[int], Callable[[], object]]:
+def _replica_run_maker(
+    scene: Scene, wanted: dict[str, Any]
+) -> Callable[[int], Callable[[], object]]:
     def prepare(count: int) -> Callable[[], object]:
-        replicas = other_flights(count)
+        replicas = random_flight_replicas(count)
         run_replicas(scene, replicas[:2], wanted=wanted)
 
         def run_once() -> None:
@@ -81,24 +88,24 @@ def _runs_of(scene: Scene, wanted: dict[str, Any]) -> Callable[[int], Callable[[
     return prepare
 
 
-def flights(count: int) -> Callable[[], object]:
-    """Return a function that runs open-loop encounters, each with other flights."""
+def prepare_open_loop_runs(count: int) -> Callable[[], object]:
+    """Return a function that runs `count` open-loop encounters, each with other flights."""
     sets = ("blocks.radar.scan_rate_hz=1", "blocks.eo.scan_rate_hz=1", "blocks.ir.scan_rate_hz=1",
             "blocks.eo.offset_s=0.05", "blocks.ir.offset_s=0.1", _TWO)  # fmt: skip
     scene = load_scene(SCENES / "monte_carlo.toml", sets=sets, duration_s=_DURATION_S)
     wanted = {"detections": ("tick", "target", "range_m"), "tracks": ("tick", "age_s")}
-    return _runs_of(scene, wanted)(count)
+    return _replica_run_maker(scene, wanted)(count)
 
 
-def loop(count: int) -> Callable[[], object]:
-    """Return a function that runs such encounters in a closed loop, with alerts and a pilot."""
-    path = folder() / "avoidance" / "crossing_pilot.toml"
+def prepare_closed_loop_runs(count: int) -> Callable[[], object]:
+    """Return a function that runs `count` closed-loop encounters (alerts, pilot), all different."""
+    path = configs_folder() / "avoidance" / "crossing_pilot.toml"
     scene = load_scene(path, sets=(_TWO,), duration_s=_DURATION_S)
-    return _runs_of(scene, {"alerts": ("tick", "level"), "manoeuvres": ("tick",)})(count)
+    return _replica_run_maker(scene, {"alerts": ("tick", "level"), "manoeuvres": ("tick",)})(count)
 
 
-def replicas(count: int) -> Callable[[], object]:
-    """Return a function that runs a chunk of a study: one encounter, other clock phases.
+def prepare_replicas(count: int) -> Callable[[], object]:
+    """Return a function that runs `count` replicas of one encounter, with random clock phases.
 
     Its metrics are those of first detections and of the age of information, with what they need of
     the tables `scans`, `detections` and `fused` recorded to memory.
@@ -109,13 +116,15 @@ def replicas(count: int) -> Callable[[], object]:
         "metrics": ["first_detection", "age_of_information"],
         "draws": {"blocks": {n: {"offset_s": {"uniform": [0, s]}} for n, s in scan_s.items()}},
     }
-    return _chunks("monte_carlo.toml", tables, count)
+    return _prepare_chunks("monte_carlo.toml", tables, count)
 
 
-def replicas_all(count: int) -> Callable[[], object]:
-    """Return a function that runs the replicas with all columns and the truth recorded."""
+def prepare_fully_recorded_replicas(count: int) -> Callable[[], object]:
+    """Return a function that runs `count` replicas, recording all columns and truth to memory."""
     (case,) = select_cases(["monte_carlo"])
-    scenes = replicas_of(scene_of(case, quick=False, sets=("record.truth=true",)), count)
+    scenes = random_phase_replicas(
+        load_case_scene(case, quick=False, sets=("record.truth=true",)), count
+    )
 
     def run_once() -> None:
         for start in range(0, count, _ALL_AT_ONCE):  # what a study would hold at a time
@@ -125,29 +134,33 @@ def replicas_all(count: int) -> Callable[[], object]:
     return run_once
 
 
-def risk(count: int) -> Callable[[], object]:
-    """Return a function that runs a chunk of a risk-ratio study, nominal and mitigated."""
+def prepare_risk_runs(count: int) -> Callable[[], object]:
+    """Return a function that, called, runs a chunk of a risk-ratio study, another encounter in each
+    replica, without and with avoidance.
+    """
     tables = {
         "replicas": 100_000,
         "metrics": ["risk_ratio"],
         "draws": {"blocks": {"traffic": {"encounter": {"sequence": [0, 1]}}}},
     }
-    return _chunks("closed_loop_risk.toml", tables, count)
+    return _prepare_chunks("closed_loop_risk.toml", tables, count)
 
 
-def risk_tracked(count: int) -> Callable[[], object]:
-    """Return a function that runs a chunk of the shipped study `radar_and_camera_risk`."""
+def prepare_tracked_risk_runs(count: int) -> Callable[[], object]:
+    """Return a function that, called, runs a chunk of the shipped study `radar_and_camera_risk`,
+    whose avoidance uses tracks.
+    """
     volume = {"horizontal_m": 670.56, "vertical_m": 137.16, "by": [], "needless": True}
     tables = {
         "replicas": 100_000,
         "metrics": [{"metric": "risk_ratio", **volume}],
         "draws": {"blocks": {"traffic": {"encounter": {"sequence": [0, 1]}}}},
     }
-    return _chunks("../avoidance/radar_and_camera.toml", tables, count)
+    return _prepare_chunks("../avoidance/radar_and_camera.toml", tables, count)
 
 
-def _chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], object]:
-    """Return a function that runs another chunk of a study at each call."""
+def _prepare_chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], object]:
+    """Return a function that at each call runs the next chunk of `count` replicas of a study."""
     study = study_of_tables(tables, read_scene_file(SCENES / scene), (), ())
     starts = iter(range(0, 100_000 - count, count))  # each time other encounters
 
@@ -162,7 +175,7 @@ def _chunks(scene: str, tables: dict[str, Any], count: int) -> Callable[[], obje
 
 @dataclass(frozen=True)
 class Rate:
-    """Something done many times."""
+    """A benchmark of something done many times: how often it is done per second of CPU time."""
 
     name: str
     what: str
@@ -183,8 +196,12 @@ class Rate:
     by_block: bool = False
 
 
-def states(count: int, within_m: float, apart_m: float, seed: int) -> tuple[State, State]:
-    """Return ownships at the origin, and an intruder of each, in flight in all directions."""
+def random_pair_states(
+    count: int, within_m: float, apart_m: float, seed: int
+) -> tuple[State, State]:
+    """Return `count` ownships at the horizontal origin and an intruder each within `within_m`, all
+    with random velocities.
+    """
     random = np.random.default_rng(seed)
 
     def flown(position: list[Any]) -> State:
@@ -198,43 +215,57 @@ def states(count: int, within_m: float, apart_m: float, seed: int) -> tuple[Stat
     return flown([zero, zero, up]), flown([east, north, up + random.normal(0.0, apart_m, count)])
 
 
-def _levels(count: int) -> Callable[[], object]:
-    configuration = read_conf(folder() / "alerting" / "do365b.conf")
+def _prepare_levels(count: int) -> Callable[[], object]:
+    configuration = read_conf(configs_folder() / "alerting" / "do365b.conf")
     levels, lookahead_s = configuration.alerters[0].levels, configuration["lookahead_time"]
-    own, intruder = states(count, 10_000.0, 200.0, 1)
+    own, intruder = random_pair_states(count, 10_000.0, 200.0, 1)
     relative = own.relative_to(intruder)
-    return lambda: due_levels(levels, violation_times_s(levels, relative, lookahead_s, None))
+    return lambda: due_and_early_due_levels(
+        levels, violation_times_s(levels, relative, lookahead_s, None)
+    )
 
 
-def _bands(count: int) -> Callable[[], object]:
-    configuration = read_conf(folder() / "alerting" / "do365b.conf")
-    own, intruder = states(count, 6_000.0, 150.0, 2)
+def _prepare_bands(count: int) -> Callable[[], object]:
+    configuration = read_conf(configs_folder() / "alerting" / "do365b.conf")
+    own, intruder = random_pair_states(count, 6_000.0, 150.0, 2)
     level = np.zeros(count, dtype=np.int64)
     intruders = [GuidedIntruders(intruder, configuration.alerters[0], level)]
     return lambda: [guidance_of_many(kind, configuration, own, intruders) for kind in KINDS]
 
 
-def _tracks_in_lock_step(count: int) -> Callable[[], object]:
-    return updates(count // (4 * LOOKS), 4)
+def _prepare_tracks_in_lock_step(count: int) -> Callable[[], object]:
+    return prepare_tracker_updates(count // (4 * LOOKS), 4)
 
 
-def _tracks_of_one_run(count: int) -> Callable[[], object]:
-    return updates(1, count // LOOKS)
+def _prepare_tracks_of_one_run(count: int) -> Callable[[], object]:
+    return prepare_tracker_updates(1, count // LOOKS)
 
 
 RATES = (
-    Rate("pair_alerts", "levels of pairs of aircraft, three volumes each", 1e6, 200_000, _levels),
-    Rate("bands", "states of an ownship and an intruder, four kinds of bands", 1e3, 1000, _bands),
+    Rate(
+        "pair_alerts",
+        "levels of pairs of aircraft, three volumes each",
+        1e6,
+        200_000,
+        _prepare_levels,
+    ),
+    Rate(
+        "bands",
+        "states of an ownship and an intruder, four kinds of bands",
+        1e3,
+        1000,
+        _prepare_bands,
+    ),
     Rate(
         "track_updates",
         "updates of tracks, EKF and global nearest neighbour, 4 targets and three "
         "sensors in 1000 replicas in lock step",
         5e5,
         4000 * LOOKS,
-        _tracks_in_lock_step,
+        _prepare_tracks_in_lock_step,
         {
-            "a plain loop": lambda quick: plain_updates(4),
-            "Stone Soup": lambda quick: stone_soup_updates(4),
+            "a plain loop": lambda quick: prepare_plain_updates(4),
+            "Stone Soup": lambda quick: prepare_stone_soup_updates(4),
         },
     ),
     Rate(
@@ -242,50 +273,50 @@ RATES = (
         "the same of 100 targets in a single run",
         2e4,
         100 * LOOKS,
-        _tracks_of_one_run,
-        {"a plain loop": lambda quick: plain_updates(10 if quick else 100)},
+        _prepare_tracks_of_one_run,
+        {"a plain loop": lambda quick: prepare_plain_updates(10 if quick else 100)},
     ),
     Rate(
         "replicas",
         "runs of 120 s, an intruder, 5, 20 and 2 Hz, other phases, first detections and ages",
         1000,
         500,
-        replicas,
+        prepare_replicas,
     ),
     Rate(
         "replicas_all",
         "the same, every column and the truth recorded to memory",
         1000,
         500,
-        replicas_all,
+        prepare_fully_recorded_replicas,
     ),
     Rate(
         "flights",
         "encounters of 120 s with other flights, two intruders, three sensors at 1 Hz, open loop",
         1000,
         1000,
-        flights,
+        prepare_open_loop_runs,
     ),
     Rate(
         "loop",
         "the same in a closed loop of tracker, alerting and pilot, lookahead 0.5 s",
         333,
         1000,
-        loop,
+        prepare_closed_loop_runs,
     ),
     Rate(
         "risk",
         "encounters of 180 s of a model, radar, tracker and alerting, nominal and mitigated",
         167,
         512,
-        risk,
+        prepare_risk_runs,
     ),
     Rate(
         "risk_tracked",
         "the same with radar and camera of stated errors, EKF, DO-365 alerting and a pilot",
         200,
         4000,
-        risk_tracked,
+        prepare_tracked_risk_runs,
         quick=64,
         by_block=True,
     ),
@@ -293,24 +324,24 @@ RATES = (
 
 
 def measure_rate(name: str, quick: bool, repeats: int) -> dict[str, Any]:
-    """Return how many are done in a second of CPU, the median of some repetitions."""
+    """Return a row of runs or updates per second of CPU time, the median of some repetitions."""
     (rate,) = (rate for rate in RATES if rate.name == name)
     count = (rate.quick or rate.count // 10) if quick else rate.count
     beside = {}
     for name, prepare in rate.beside.items():
         other = prepare(quick)
         if other is not None:
-            beside[name] = _per_s(*other, 1 if quick else min(repeats, 2))
+            beside[name] = _count_per_cpu_s(*other, 1 if quick else min(repeats, 2))
     run_once = rate.prepare(count)
-    per_s = _per_s(count, run_once, repeats)
-    shares = shares_by_block(run_once) if rate.by_block else {}
+    per_s = _count_per_cpu_s(count, run_once, repeats)
+    shares = cpu_shares_by_block(run_once) if rate.by_block else {}
     return {
         "scene": rate.name, "per_s": per_s, "wanted": rate.wanted, "beside": beside,
         "shares": shares,
     }  # fmt: skip
 
 
-def _per_s(count: int, run_once: Callable[[], object], repeats: int) -> float:
+def _count_per_cpu_s(count: int, run_once: Callable[[], object], repeats: int) -> float:
     run_once()
     result = []
     for _ in range(repeats):

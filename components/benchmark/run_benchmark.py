@@ -12,7 +12,7 @@ from components.benchmark.pairs import PAIRS, Pair
 from components.benchmark.rates import RATES, Rate
 from components.benchmark.scenes import BenchmarkCase, select_cases
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import check_file
+from dsa_des.files.output_file import check_file_writable
 from dsa_des.files.output_names import user_path
 from dsa_des.record.run_folder import write_json
 from dsa_des.terminal import terminal
@@ -33,7 +33,7 @@ def run_benchmark(
     compare: str | None,
     embed: bool,
 ) -> None:
-    """Measure the cases; without names, all of them."""
+    """Measure the named benchmark scenes, else all; print the tables and write rows where asked."""
     if embed and (scenes or compare):
         raise UsageError("--embed measures one thing of its own: leave out scenes and --compare")
     pairs = [pair for pair in PAIRS if not scenes or pair.name in scenes]
@@ -44,16 +44,16 @@ def run_benchmark(
     before = {} if compare is None else _read_results(Path(compare))
     target = None if json_file is None else user_path(json_file, "--json")
     if target is not None:
-        check_file(target, "--json")
+        check_file_writable(target, "--json")
     console = terminal.console()
     asked = _Asked(console, quick, repeats or (2 if quick else 5))
-    rows = _calls(asked) if embed else []
+    rows = _measure_calls(asked) if embed else []
     if cases and not embed:
-        rows += _cases(asked, cases, before)
+        rows += _measure_cases(asked, cases, before)
     if pairs and not embed:
-        rows += _pairs(asked, pairs)
+        rows += _measure_pairs(asked, pairs)
     if rates and not embed:
-        rows += _rates(asked, rates)
+        rows += _measure_rates(asked, rates)
     if target is not None:
         try:
             write_json(target, rows)
@@ -63,7 +63,7 @@ def run_benchmark(
 
 
 def measure_in_new_process(kind: str, name: str, quick: bool, repeats: int) -> dict[str, Any]:
-    """Return the row of one thing, measured in a process of its own."""
+    """Return the result row of one benchmark, measured in a new Python process."""
     # -P: no file of the working directory is imported.
     command = [sys.executable, "-P", "-m", "components.benchmark.measure", kind, name]
     command += [f"--repeats={repeats}", *(["--quick"] if quick else [])]
@@ -76,7 +76,7 @@ def measure_in_new_process(kind: str, name: str, quick: bool, repeats: int) -> d
 
 @dataclass(frozen=True)
 class _Asked:
-    """How to measure, and where to print it."""
+    """Options of a benchmark run, and the console to which it prints."""
 
     console: Any
     quick: bool
@@ -90,8 +90,10 @@ class _Asked:
             rows.append(measure_in_new_process(kind, thing.name, self.quick, self.repeats))
         return rows
 
-    def show(self, headings: Sequence[str], lines: Iterable[Sequence[str]], apart: int = 1) -> None:
-        """Print a table whose first column alone is text."""
+    def print_table(
+        self, headings: Sequence[str], lines: Iterable[Sequence[str]], apart: int = 1
+    ) -> None:
+        """Print a table with the first column, of text, flush left and all others flush right."""
         from rich.table import Table
 
         table = Table(box=None, padding=(0, apart, 0, 0))
@@ -102,7 +104,7 @@ class _Asked:
         self.console.print(table)
 
 
-def _cases(
+def _measure_cases(
     asked: _Asked, cases: list[BenchmarkCase], before: dict[str, Any]
 ) -> list[dict[str, Any]]:
     rows = asked.measure_named("scenes", cases)
@@ -124,7 +126,7 @@ def _cases(
             ratio = "ratio_to_yardstick"
             old = before.get(case.name)
             lines[-1].append("" if old is None else f"{row[ratio] / old[ratio]:.2f} x")
-    asked.show([*headings, *(["since"] if before else [])], lines)
+    asked.print_table([*headings, *(["since"] if before else [])], lines)
     asked.console.print(_LEGEND, style="dim", soft_wrap=True)
     for row in rows:
         if row["scene"] == "thesis":
@@ -135,9 +137,9 @@ def _cases(
     return rows
 
 
-def _pairs(asked: _Asked, pairs: list[Pair]) -> list[dict[str, Any]]:
+def _measure_pairs(asked: _Asked, pairs: list[Pair]) -> list[dict[str, Any]]:
     rows = asked.measure_named("pairs", pairs)
-    asked.show(
+    asked.print_table(
         ("what costs little", "times", "half of them", "at most"),
         [
             (pair.name, f"{row['times']:.3f}", "{:.3f}-{:.3f}".format(*row["times_quartiles"]),
@@ -149,9 +151,9 @@ def _pairs(asked: _Asked, pairs: list[Pair]) -> list[dict[str, Any]]:
     return rows
 
 
-def _rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
+def _measure_rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
     rows = asked.measure_named("rates", rates)
-    asked.show(
+    asked.print_table(
         ("what is done often", "per s", "at least"),
         [
             (rate.name, f"{row['per_s']:,.0f}", f"{rate.wanted:,.0f}")
@@ -174,7 +176,7 @@ def _rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
     return rows
 
 
-def _calls(asked: _Asked) -> list[dict[str, Any]]:
+def _measure_calls(asked: _Asked) -> list[dict[str, Any]]:
     row = measure_in_new_process("calls", "embed", asked.quick, asked.repeats)
     asked.console.print(f"simulate: {row['what']}; {row['calls']} calls", soft_wrap=True)
     names = {
@@ -189,7 +191,7 @@ def _calls(asked: _Asked) -> list[dict[str, Any]]:
         first = f"{row['first_us']:.0f}" if key == "wall_us" else ""
         wanted = "" if key in ("cpu_us", "fixed_us") else f"{row['wanted_p99_us']:.0f}"
         lines.append((name, p50, p99, wanted, most, first))
-    asked.show(("us per call", "p50", "p99", "wanted", "max", "first"), lines, apart=2)
+    asked.print_table(("us per call", "p50", "p99", "wanted", "max", "first"), lines, apart=2)
     wanted_ms = row["wanted_p99_us"] / 1000.0
     share = row["share_within_wanted"]
     asked.console.print(f"{share:.1%} of the calls within {wanted_ms:g} ms of wall time")

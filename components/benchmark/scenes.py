@@ -12,7 +12,7 @@ from statistics import median
 from typing import Any
 
 from components.benchmark import yardstick
-from components.examples import folder
+from components.examples import configs_folder
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink, Sink
@@ -21,7 +21,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 from dsa_des.time.randomness import Streams
 
-SCENES = folder() / "benchmark"
+SCENES = configs_folder() / "benchmark"
 CLOCKED = ("eo", "ir", "radar")
 
 
@@ -85,16 +85,16 @@ def select_cases(names: Sequence[str]) -> list[BenchmarkCase]:
     return [known[name] for name in names] if names else list(CASES)
 
 
-def scene_of(
+def load_case_scene(
     case: BenchmarkCase, *, quick: bool, duration_s: str | None = None, sets: tuple[str, ...] = ()
 ) -> Scene:
-    """Load a case's scene, perhaps shortened or changed."""
+    """Return a benchmark case's loaded scene, shortened if `quick`, with the changes in `sets`."""
     sets = (*case.quick, *sets) if quick else sets
     return load_scene(SCENES / f"{case.name}.toml", sets=sets, duration_s=duration_s)
 
 
-def replicas_of(scene: Scene, count: int) -> list[Scene]:
-    """Return replicas of a scene: other seeds, and random phases of the three clocks."""
+def random_phase_replicas(scene: Scene, count: int) -> list[Scene]:
+    """Return copies of a scene with other seeds and random phases of the three sensors' clocks."""
     stream = Streams(scene.seed).stream("benchmark", "phase")
     result = []
     for number in range(count):
@@ -115,27 +115,27 @@ _SAMPLED_REPLICAS = 5
 
 
 def measure_scene(name: str, quick: bool, repeats: int) -> dict[str, Any]:
-    """Return medians over interleaved repetitions, and the peak memory of a first run.
+    """Return a scene's result row: medians over interleaved repetitions, first peak memory.
 
     What a user waits for is building and running: targets that are never in reach are found when a
     run is built. Their sum is what the ratio to the yardstick is made of.
     """
     (case,) = select_cases([name])
-    scene = scene_of(case, quick=quick)
+    scene = load_case_scene(case, quick=quick)
     replicas = case.quick_replicas if quick else case.replicas
-    scenes = replicas_of(scene, replicas) if replicas else []
+    scenes = random_phase_replicas(scene, replicas) if replicas else []
     built, engine, plain = [], [], []
     units = 0
-    engine_run(scene, scenes, MemorySink())
-    memory_mb = peak_mb()  # before anything but the engine has run
-    yardstick_run = _yardstick(case, scene, scenes)
+    time_engine_run(scene, scenes, MemorySink())
+    memory_mb = peak_memory_mb()  # before anything but the engine has run
+    yardstick_run = _prepare_yardstick(case, scene, scenes)
     for _ in range(repeats):
-        build_s, run_s, units = engine_run(scene, scenes, MemorySink())
+        build_s, run_s, units = time_engine_run(scene, scenes, MemorySink())
         built.append(build_s)
         engine.append(run_s)
         plain.append(yardstick_run())
     # Afterwards, as Arrow's memory slows what comes after it; its first file loads libraries.
-    parquet = [engine_run(scene, scenes, None)[1] for _ in range(repeats + 1)][1:]
+    parquet = [time_engine_run(scene, scenes, None)[1] for _ in range(repeats + 1)][1:]
     whole = [build_s + run_s for build_s, run_s in zip(built, engine, strict=True)]
     seconds_per_unit = median(plain)
     simulated_s = float(Simulation(scene).duration_s) * max(1, len(scenes))
@@ -157,14 +157,16 @@ def measure_scene(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     }
 
 
-def _time_call(run: Callable[[], Any]) -> float:
+def _cpu_seconds_of(run: Callable[[], Any]) -> float:
     started = time.process_time()
     run()
     return time.process_time() - started
 
 
-def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[float, float, int]:
-    """Return CPU times of building and of running with recording, and the target-scans.
+def time_engine_run(
+    scene: Scene, scenes: list[Scene], sink: Sink | None
+) -> tuple[float, float, int]:
+    """Run a scene once; return CPU seconds of building and of running, and count target-scans.
 
     Without replicas in `scenes` a single run of `scene`; without a sink into Parquet in passing.
     """
@@ -172,7 +174,7 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
         from dsa_des.record.arrow import ParquetSink
 
         with tempfile.TemporaryDirectory() as folder:
-            return engine_run(scene, scenes, ParquetSink(Path(folder)))
+            return time_engine_run(scene, scenes, ParquetSink(Path(folder)))
     recorder = Recorder([sink])
     started = time.process_time()
     simulation = (
@@ -181,14 +183,14 @@ def engine_run(scene: Scene, scenes: list[Scene], sink: Sink | None) -> tuple[fl
         else Simulation(scene, recorder=recorder)
     )
     build_s = time.process_time() - started
-    cpu_s = _time_call(simulation.run)
-    scans = _scans(simulation)
+    cpu_s = _cpu_seconds_of(simulation.run)
+    scans = _count_scans(simulation)
     traffic: Any = simulation.components["traffic"]
     return build_s, cpu_s, scans * len(getattr(traffic, "face", traffic).roster)
 
 
-def _scans(simulation: Simulation) -> int:
-    """Count the scans of all sensors, one replica at a time so that it takes no memory."""
+def _count_scans(simulation: Simulation) -> int:
+    """Return the number of scans of all sensors and replicas, counted by replica to save memory."""
     clocks = [node.clock for node in simulation.nodes.values() if node.clock is not None]
     result = 0
     for run in range(simulation.runs.count):
@@ -197,8 +199,10 @@ def _scans(simulation: Simulation) -> int:
     return result
 
 
-def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callable[[], float]:
-    """Prepare the yardstick; return what runs it and gives its seconds per target-scan."""
+def _prepare_yardstick(
+    case: BenchmarkCase, scene: Scene, scenes: list[Scene]
+) -> Callable[[], float]:
+    """Return a function giving the plain loop's CPU seconds per target-scan on the same flights."""
     step = max(1, len(scenes) // _SAMPLED_REPLICAS)
     prepared = [yardstick.prepare(_fly_if_steered(one)) for one in (scenes[::step] or [scene])]
 
@@ -211,14 +215,14 @@ def _yardstick(case: BenchmarkCase, scene: Scene, scenes: list[Scene]) -> Callab
 
 
 def _fly_if_steered(scene: Scene) -> Simulation:
-    """Return a scene's simulation for the plain loop, run first where its ownship is steered."""
+    """Return the scene's simulation, already run if its ownship is steered, to know its path."""
     simulation = Simulation(scene)
     if len(getattr(simulation.components["traffic"].own, "segments", ())) != 1:  # type: ignore[attr-defined]
         simulation.run()
     return simulation
 
 
-def peak_mb() -> float:
+def peak_memory_mb() -> float:
     """Return the largest memory that this process has had, MB."""
     status = Path("/proc/self/status")
     if status.exists():  # Linux counts in ru_maxrss what the process had before it was this program

@@ -8,8 +8,8 @@ from typing import Any
 from dsa_des.running.node import Node
 
 
-def shares_by_block(do: Callable[[], object]) -> dict[str, float]:
-    """Do something; return each block's share of its CPU, the largest first.
+def cpu_shares_by_block(do: Callable[[], object]) -> dict[str, float]:
+    """Call a function and return each block's share (0 to 1) of its CPU time, largest first.
 
     A block's is that of its wakes: what it reads, does and sends. What is missing to 1 are the
     making of runs, the engine between wakes, and metrics.

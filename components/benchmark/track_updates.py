@@ -19,9 +19,9 @@ from scipy.optimize import linear_sum_assignment
 import dsa_des
 from components.estimation.batched import multiply_by_transpose, product
 from components.estimation.frame import SensorPose, pose_in_frame
-from components.estimation.measurement import position_of
+from components.estimation.measurement import position_and_jacobian
 from components.tracking.filters import ExtendedKalman
-from components.tracking.scans import Scans, scans_of
+from components.tracking.scans import Scans, looks_of_message
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.wake import Wake
 from dsa_des.replicas.changed_scene import Replica, replica_scene
@@ -33,7 +33,7 @@ LOOKS = (5 + 20 + 2) * _DURATION_S
 
 
 class Listening(ExtendedKalman):
-    """A tracker that keeps what it is given."""
+    """A tracker that stores the messages of every wake, so that a benchmark can feed them again."""
 
     rewindable = False
     kept: list[Wake]
@@ -49,8 +49,8 @@ class Listening(ExtendedKalman):
         return super().run(wake)
 
 
-def make_listening(replicas: int, targets: int) -> Listening:
-    """Return the tracker of a run of some replicas, with all that it was given.
+def record_tracker_inputs(replicas: int, targets: int) -> Listening:
+    """Run a scene with some replicas and targets; return its tracker with all messages stored.
 
     Three sensors see every target at every look.
     """
@@ -64,9 +64,9 @@ def make_listening(replicas: int, targets: int) -> Listening:
     return block
 
 
-def updates(replicas: int, targets: int) -> Callable[[], object]:
-    """Return a function that tracks all targets of some replicas anew, with gating."""
-    known = make_listening(replicas, targets)
+def prepare_tracker_updates(replicas: int, targets: int) -> Callable[[], object]:
+    """Return a function that tracks all targets of some replicas anew, gated, from the messages."""
+    known = record_tracker_inputs(replicas, targets)
 
     def track() -> None:
         block = ExtendedKalman(known.name, known.p, known.context)
@@ -125,7 +125,7 @@ _UNUSED = 1e6
 
 @dataclass(frozen=True, eq=False)
 class PlainLook:
-    """One look of one sensor."""
+    """One scan of one sensor for the plain loop: time, sensor pose, measurements and variances."""
 
     time_s: float
     #: (3,): Of the sensor, north, east, down.
@@ -137,8 +137,10 @@ class PlainLook:
     variance: FloatArray
 
 
-def measure_state(state: FloatArray, look: PlainLook, size: int) -> tuple[FloatArray, FloatArray]:
-    """Return the expected measurement of a state, (size,), and its derivative, (size, 6)."""
+def measurement_and_jacobian(
+    state: FloatArray, look: PlainLook, size: int
+) -> tuple[FloatArray, FloatArray]:
+    """Return a state's expected measurement (size,), and its derivative by the state (size, 6)."""
     away = state[:3] - look.position_m
     x, y, z = look.to_body @ away
     level, distance = hypot(x, y), sqrt(x * x + y * y + z * z)
@@ -161,7 +163,7 @@ def track_plainly(
     intensity: float,
     begin_s: float = 0.0,
 ) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return states and covariances of tracks after all looks."""
+    """Return final states and covariances of tracks updated with the looks one after the other."""
     states, covariances, last_s = list(states), list(covariances), begin_s
     step, identity = np.eye(6), np.eye(6)
     for look in looks:
@@ -177,7 +179,7 @@ def track_plainly(
             states[k], covariances[k] = state, covariance
             if count == 0:
                 continue
-            expected, slope = measure_state(state, look, size)
+            expected, slope = measurement_and_jacobian(state, look, size)
             apart = look.measured - expected
             apart[:, 0] = (apart[:, 0] + pi) % (2.0 * pi) - pi
             total = slope @ covariance @ slope.T
@@ -208,10 +210,10 @@ def track_plainly(
 _FEW = 27
 
 
-def plain_updates(targets: int) -> tuple[int, Callable[[], object]]:
-    """Return how many updates the plain loop does in one run, and what does them."""
-    block = make_listening(1, targets)
-    scans, poses = _looks(block)
+def prepare_plain_updates(targets: int) -> tuple[int, Callable[[], object]]:
+    """Return the updates per call of the plain tracking loop, and the function that runs it."""
+    block = record_tracker_inputs(1, targets)
+    scans, poses = _recorded_scans(block)
     looks = plain_looks(scans, poses, block.context.ticks_per_s)
     first, rest = _start_tracks(scans, poses, block.p.start_speed_m_s), looks[1:]
     updates = sum(len(look.measured) for look in rest)
@@ -219,25 +221,25 @@ def plain_updates(targets: int) -> tuple[int, Callable[[], object]]:
     return updates, lambda: track_plainly(rest, *first, intensity, looks[0].time_s)
 
 
-def stone_soup_updates(targets: int) -> tuple[int, Callable[[], object]] | None:
-    """Return how many updates Stone Soup's tracker does in some looks, and what does them.
+def prepare_stone_soup_updates(targets: int) -> tuple[int, Callable[[], object]] | None:
+    """Return the updates per call of Stone Soup's tracker, and the function that runs it.
 
     None where it is not installed.
     """
     if find_spec("stonesoup") is None:
         return None
-    from components.stone_soup.objects import Poses, detections, instant
+    from components.stone_soup.objects import Poses, make_detections, to_datetime
 
-    block = make_listening(1, targets)
-    scans, believed = _looks(block)
+    block = record_tracker_inputs(1, targets)
+    scans, believed = _recorded_scans(block)
     poses = Poses(believed)
     looks = []
     for k in range(min(len(scans), _FEW)):
         which = slice(int(scans.offsets[k]), int(scans.offsets[k + 1]))
-        when = instant(int(scans.tick[k]) / block.context.ticks_per_s)
+        when = to_datetime(int(scans.tick[k]) / block.context.ticks_per_s)
         count = which.stop - which.start
         looks.append(
-            (when, detections(poses, [k] * count, when, scans.measured[:, which],
+            (when, make_detections(poses, [k] * count, when, scans.measured[:, which],
                               scans.variance[:, which], [{} for _ in range(count)]))
         )  # fmt: skip
     intensity, speed = block.p.acceleration_intensity_m2_s3, block.p.start_speed_m_s
@@ -280,8 +282,8 @@ def _stone_soup_tracker(intensity: float, speed_m_s: float) -> Any:
     )
 
 
-def _looks(block: Listening) -> tuple[Scans, SensorPose]:
-    scans = Scans.concatenate([scans_of(wake["fused"]) for wake in block.kept])
+def _recorded_scans(block: Listening) -> tuple[Scans, SensorPose]:
+    scans = Scans.concatenate([looks_of_message(wake["fused"]) for wake in block.kept])
     origin = scans.pose[:3, :1]
     lat, lon, alt = (np.repeat(value, len(scans)) for value in origin)
     pose = scans.pose
@@ -290,7 +292,7 @@ def _looks(block: Listening) -> tuple[Scans, SensorPose]:
 
 
 def plain_looks(scans: Scans, poses: SensorPose, ticks_per_s: int) -> list[PlainLook]:
-    """Return looks as the plain loop takes them."""
+    """Return scans as `PlainLook`: time, sensor pose, measurements and variances."""
     result = []
     for k in range(len(scans)):
         which = slice(int(scans.offsets[k]), int(scans.offsets[k + 1]))
@@ -308,9 +310,9 @@ def plain_looks(scans: Scans, poses: SensorPose, ticks_per_s: int) -> list[Plain
 def _start_tracks(
     scans: Scans, poses: SensorPose, speed_m_s: float
 ) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return a track for each detection of the first look, as our trackers start them."""
+    """Return states and covariances of tracks started, as ours, by the first scan's detections."""
     which = np.arange(int(scans.offsets[1]))
-    position, slope = position_of(scans.measured[:3, which], poses.take(0 * which))
+    position, slope = position_and_jacobian(scans.measured[:3, which], poses.take(0 * which))
     spread = np.zeros((3, 3, len(which)))
     for i in range(3):
         spread[i, i] = scans.variance[i, which]

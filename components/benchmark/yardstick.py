@@ -56,7 +56,7 @@ def straight_flight(parameters: list[float]) -> Callable[[float], Position]:
     return position
 
 
-def line_of_sight(own: Position, target: Position) -> tuple[float, float, float]:
+def north_east_up_m(own: Position, target: Position) -> tuple[float, float, float]:
     """Return north, east and up offsets (m) of a target, exact on the WGS-84 ellipsoid."""
     e2 = ECCENTRICITY_SQUARED
     lat1, lon1, alt1, _ = own
@@ -86,8 +86,8 @@ def line_of_sight(own: Position, target: Position) -> tuple[float, float, float]
     return north, across * cos(half_lon), up
 
 
-def level_body_axes(yaw_rad: float, pitch_rad: float, roll_rad: float) -> list[float]:
-    """Return the nine cosines that turn north, east, down into nose, right wing, floor (ZYX)."""
+def ned_to_body_matrix(yaw_rad: float, pitch_rad: float, roll_rad: float) -> list[float]:
+    """Return nine elements, by row, of the rotation from NED to nose, right wing, floor (ZYX)."""
     sy, cy = sin(yaw_rad), cos(yaw_rad)
     sp, cp = sin(pitch_rad), cos(pitch_rad)
     sr, cr = sin(roll_rad), cos(roll_rad)
@@ -98,11 +98,13 @@ def level_body_axes(yaw_rad: float, pitch_rad: float, roll_rad: float) -> list[f
     ]  # fmt: skip
 
 
-def silhouette(
+def aspect_cosines(
     north: float, east: float, up: float, range_m: float, attitude: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return the cosine and sine of the angle off a target's nose, and |u_z| in its body axes."""
-    m = level_body_axes(*attitude)
+    """Return cosine and sine of the angle between the line of sight and a target's nose, and the
+    size of its component along body z.
+    """
+    m = ned_to_body_matrix(*attitude)
     n, e, d = north / range_m, east / range_m, -up / range_m
     x = m[0] * n + m[1] * e + m[2] * d
     y = m[3] * n + m[4] * e + m[5] * d
@@ -116,7 +118,7 @@ OwnState = tuple[Position, tuple[float, float]]
 
 @dataclass
 class LoopSensor:
-    """What the loop needs to know of one sensor."""
+    """A sensor's data for the plain loop: scans, field of view, resolution, detection threshold."""
 
     name: str
     kind: str
@@ -139,7 +141,7 @@ class LoopSensor:
 
 @dataclass
 class LoopResult:
-    """What the loop found: its detections by (sensor, scan, target index), fused and held."""
+    """The plain loop's detections by (sensor, scan, target index), fused count, and tracks held."""
 
     detections: dict[tuple[str, int, int], tuple[float, float, float]]
     fused: int
@@ -149,7 +151,7 @@ class LoopResult:
 
 @dataclass
 class Prepared:
-    """Everything the loop starts from: flights, sensors, random draws, and who scans when."""
+    """What the plain loop starts from: flights, random draws, and sensors to scan at each tick."""
 
     seconds_per_tick: float
     own: Callable[[float], OwnState]
@@ -159,11 +161,11 @@ class Prepared:
 
 
 def prepare(simulation: Simulation) -> Prepared:
-    """Read a scene that is ready to run; only its data are used."""
+    """Return what the plain loop needs of a ready scene: flights, sensors, draws and scan times."""
     traffic: Any = simulation.components["traffic"]
     targets = [target.segments[0] for target in traffic.targets]
     calendar: dict[int, list[tuple[LoopSensor, int]]] = {}
-    for sensor in _sensors(simulation):
+    for sensor in _loop_sensors(simulation):
         for tick, scan in sensor.scans:
             calendar.setdefault(tick, []).append((sensor, scan))
         if sensor.kind == "radar":
@@ -180,7 +182,7 @@ def prepare(simulation: Simulation) -> Prepared:
 
 
 def _own_flight(own: Any, ticks: list[int], ticks_per_s: int) -> Callable[[float], OwnState]:
-    """Return the ownship's flight; one that was steered is looked up, as it was flown."""
+    """Return a function from time to own position and tilt; steered flights are as flown."""
     if len(getattr(own, "segments", ())) == 1:
         flight, segment = straight_flight(own.segments[0].parameters.tolist()), own.segments[0]
         return lambda time_s: (flight(time_s), (segment.pitch_rad, segment.roll_rad))
@@ -193,7 +195,7 @@ def _own_flight(own: Any, ticks: list[int], ticks_per_s: int) -> Callable[[float
     return lambda time_s: flown[time_s]
 
 
-def _sensors(simulation: Simulation) -> list[LoopSensor]:
+def _loop_sensors(simulation: Simulation) -> list[LoopSensor]:
     roster = simulation.components["traffic"].roster  # type: ignore[attr-defined]
     sensors = []
     for name in ("radar", "eo", "ir"):
@@ -224,12 +226,12 @@ def _sensors(simulation: Simulation) -> list[LoopSensor]:
             sensor.pixels = float(block.p.azimuth_pixels * block.p.elevation_pixels)
             sensor.weight = block.p.static_weight
             sensor.threshold = block.detector.threshold
-            sensor.areas = _areas(roster, block.areas, block.contrasts)
+            sensor.areas = _target_areas(roster, block.areas, block.contrasts)
         sensors.append(sensor)
     return sensors
 
 
-def _areas(
+def _target_areas(
     roster: Any, areas: str, contrast: str
 ) -> list[tuple[float, float, float, float, float]]:
     back = "back_m2" if areas == "ir" else "front_m2"
@@ -247,10 +249,10 @@ def run(scene: Prepared, every: int = 1) -> LoopResult:
         looking = scene.calendar[tick]
         time_s = tick * seconds
         own, tilt = scene.own(time_s)
-        axes = level_body_axes(own[3], *tilt)
+        axes = ned_to_body_matrix(own[3], *tilt)
         for target, flight in enumerate(flights):
             position = flight(time_s)
-            north, east, up = line_of_sight(own, position)
+            north, east, up = north_east_up_m(own, position)
             x = axes[0] * north + axes[1] * east - axes[2] * up
             y = axes[3] * north + axes[4] * east - axes[5] * up
             z = axes[6] * north + axes[7] * east - axes[8] * up
@@ -275,7 +277,7 @@ def run(scene: Prepared, every: int = 1) -> LoopResult:
                         continue
                 else:
                     front, back, side, plane, contrast = sensor.areas[target]
-                    nose, off_nose, floor = silhouette(
+                    nose, off_nose, floor = aspect_cosines(
                         north, east, up, range_m, (position[3], *angles[target])
                     )
                     share = 0.5 * nose + 0.5

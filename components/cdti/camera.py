@@ -36,8 +36,8 @@ class CameraSights:
         #: The latest positions and attitudes of all aircraft: what there is to be seen.
         self.states: TrafficStates | None = None
 
-    def take(self, block: str, message: Detections, ticks_per_s: int) -> None:
-        """Store the detections of a camera."""
+    def store_detections(self, block: str, message: Detections, ticks_per_s: int) -> None:
+        """Store a message's detections as each target's latest, if by a camera with a picture."""
         if block not in self._cameras or "pixels" not in message.extras:
             return
         self._roster, self._ticks_per_s = message.roster, ticks_per_s
@@ -66,7 +66,7 @@ class CameraSights:
             return None
         target = contact
         if contact >= TRACKS_FROM:
-            target = -1 if toward is None else self._nearest(toward, time_s, own)
+            target = -1 if toward is None else self._nearest_target(toward, time_s, own)
         if not 0 <= target < len(roster):
             return None
         names = [n for n, seen in self._seen.items() if math.isfinite(seen[target, 0])]
@@ -92,8 +92,8 @@ class CameraSights:
             range_m,
             pixel_rad,
         )
-        line = horizon(own_attitude, (azimuth, elevation), _dip_rad(own.alt_m), pixel_rad)
-        strength = camera.p.static_weight * pixels * float(camera.share(pixels))
+        line = horizon(own_attitude, (azimuth, elevation), _horizon_dip_rad(own.alt_m), pixel_rad)
+        strength = camera.p.static_weight * pixels * float(camera.counted_signature_share(pixels))
         contrast = (margin + camera.detector.threshold) / strength if strength > 0.0 else 0.0
         # A camera that renders what it sees shows just that.
         patches = getattr(camera, "patches", {})
@@ -115,8 +115,8 @@ class CameraSights:
             "wing": np.round(drawn.wing, 2).tolist(),
         }
 
-    def _nearest(self, toward: tuple[float, float], time_s: float, own: OwnNow) -> int:
-        """Return the target that a camera saw lately nearest to a direction, -1 for none."""
+    def _nearest_target(self, toward: tuple[float, float], time_s: float, own: OwnNow) -> int:
+        """Return the lately seen target nearest to a direction (index); -1 for none close by."""
         attitude = own.heading_rad, own.pitch_rad, own.roll_rad
         line = np.array(ned_to_body(*unit_vector_unchecked(*toward), *attitude))
         best, least = -1, math.cos(NEAR_RAD)
@@ -129,8 +129,8 @@ class CameraSights:
         return best
 
 
-def _dip_rad(alt_m: float) -> float:
-    """Return how far the horizon of a sphere of the Earth's size lies below the level."""
+def _horizon_dip_rad(alt_m: float) -> float:
+    """Return how far, rad, a spherical Earth's horizon lies below the horizontal at an altitude."""
     return math.acos(1.0 / (1.0 + max(alt_m, 0.0) / 6_371_000.0))
 
 
@@ -149,7 +149,7 @@ def silhouette(
     range_m: float,
     pixel_rad: tuple[float, float],
 ) -> Silhouette:
-    """Return the outlines of a target as a camera on the ownship has them.
+    """Return pixel outlines of a target's fuselage and wing in an ownship camera's picture.
 
     The bodies are those whose areas decide about the detection: a sphere drawn out into a capsule
     along the x axis, and a plate in the x-y plane (`components.optical.silhouette`).
@@ -157,7 +157,7 @@ def silhouette(
     elevation in the ownship's body axes; a pixel sees `pixel_rad` across and up.
     """
     to_body = _body_to_ned(own_attitude_rad).T @ _body_to_ned(target_attitude_rad)
-    right, up, _ = _axes(direction_rad)
+    right, up, _ = _picture_axes(direction_rad)
     scale = np.stack([right / pixel_rad[0], up / pixel_rad[1]]) @ to_body / range_m
     radius = math.sqrt(areas.front_m2 / math.pi)
     half = 0.25 * areas.side_m2 / radius if radius else 0.0
@@ -190,20 +190,20 @@ def horizon(
     dip_rad: float,
     pixel_rad: tuple[float, float],
 ) -> Horizon:
-    """Return where the horizon, `dip_rad` below the level, lies on the picture around a direction.
+    """Return the horizon's straight line, `dip_rad` below level, in a picture of this direction.
 
     The sine of the elevation over the level is linear in the direction; what is far from the middle
     lies where its tangent there puts it.
     """
-    right, up, along = _axes(direction_rad)
+    right, up, along = _picture_axes(direction_rad)
     upward = -_body_to_ned(own_attitude_rad)[2]
     across, upright = float(right @ upward) * pixel_rad[0], float(up @ upward) * pixel_rad[1]
     missing = -math.sin(dip_rad) - float(along @ upward)
     return Horizon(missing / max(math.hypot(across, upright), 1e-12), math.atan2(across, upright))
 
 
-def _axes(direction_rad: tuple[float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the picture's axes to the right and up and the line of sight, in body axes."""
+def _picture_axes(direction_rad: tuple[float, float]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return three unit vectors in body axes: picture's right, picture's up, and line of sight."""
     azimuth, _ = direction_rad
     right = np.array([-math.sin(azimuth), math.cos(azimuth), 0.0])
     along = np.array(unit_vector_unchecked(*direction_rad))
@@ -211,17 +211,17 @@ def _axes(direction_rad: tuple[float, float]) -> tuple[FloatArray, FloatArray, F
 
 
 def _body_to_ned(attitude_rad: FloatArray) -> FloatArray:
-    """Return the rotation of yaw, pitch and roll, (3, 3)."""
+    """Return the rotation (3, 3) from body to north, east, down axes for yaw, pitch and roll."""
     return np.stack(body_to_ned(*np.eye(3), *attitude_rad))
 
 
 def _hull(points: FloatArray) -> FloatArray:
     """Return the convex hull of points in a plane, counter-clockwise (Andrew's monotone chain)."""
     ordered = sorted(map(tuple, points.tolist()))
-    return np.array([*_chain(ordered), *_chain(ordered[::-1])])
+    return np.array([*_half_hull(ordered), *_half_hull(ordered[::-1])])
 
 
-def _chain(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+def _half_hull(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     result: list[tuple[float, ...]] = []
     for point in points:
         while len(result) > 1 and _signed_area(result[-2], result[-1], point) <= 0.0:

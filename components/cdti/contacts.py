@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import offset_positions
+from components.display.picture_plane import offset_positions
 from components.estimation.frame import vectors_in_frame
 from components.geometry import body_to_ned, north_east_up, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
@@ -24,7 +24,7 @@ _SPEED_OVER_S = 0.5
 
 @dataclass(frozen=True)
 class OwnNow:
-    """The ownship at the latest instant that is known."""
+    """The ownship's position, attitude, speed and climb at the latest instant received."""
 
     lat_deg: float
     lon_deg: float
@@ -45,8 +45,8 @@ class OwnFlight:
         # Latitude, longitude (deg), altitude, yaw, pitch, roll.
         self._pose: FloatArray = np.empty((0, 6))
 
-    def take(self, states: TrafficStates, ticks_per_s: int) -> None:
-        """Store new positions of the ownship."""
+    def store_states(self, states: TrafficStates, ticks_per_s: int) -> None:
+        """Store newly received own poses, and update the latest state with speed and climb."""
         new = np.stack([
             states.own_lat_deg, states.own_lon_deg, states.own_alt_m, states.own_yaw_rad,
             states.own_pitch_rad, states.own_roll_rad,
@@ -66,14 +66,14 @@ class OwnFlight:
         lat_deg, lon_deg, alt_m, yaw, pitch, roll = self._pose[-1].tolist()
         self.now = OwnNow(lat_deg, lon_deg, alt_m, yaw, pitch, roll, speed, climb)
 
-    def poses(self, tick: IntArray) -> FloatArray:
-        """Return the last poses not after some instants, (n, 6); the first one before it."""
+    def poses_at(self, tick: IntArray) -> FloatArray:
+        """Return the last own pose by each tick (n, 6), degrees, m, rad; else the first pose."""
         index = np.searchsorted(self._tick, tick, side="right") - 1
         return self._pose[np.maximum(index, 0)]
 
 
 def _displacement_from(own: FloatArray, position: FloatArray) -> FloatArray:
-    """Return how far positions (n, 3) are east and north of a place, and how much higher, (n, 3).
+    """Return how far positions (n, 3) lie east, north and up of the own position, m (n, 3).
 
     Latitude and longitude, deg, and altitude, m; NaN where they are not known.
     """
@@ -105,7 +105,7 @@ class Contacts:
     toward: FloatArray
 
     def rows_to_show(self, own: OwnNow, time_s: float, forgotten_s: float) -> list[list[Any]]:
-        """Return the contacts as the page has them, ranged ones first.
+        """Return a row of numbers per contact up to `forgotten_s` old, those with a range first.
 
         [number, east_m, north_m, up_m, bearing_deg, age_s] from the ownship as it is now; the three
         are None without a range.
@@ -127,7 +127,7 @@ class Contacts:
 def contacts_of_lines(
     message: Tracks | FusedDetections, own: OwnFlight, ticks_per_s: int, before: Contacts | None
 ) -> Contacts:
-    """Return the contacts of one row of measured lines of sight.
+    """Return the contacts after one more row of measured lines of sight, given those before.
 
     Where only a direction was measured, the last range counts for a while yet. Tracks hold what was
     measured; fused lines are of one instant, and contacts that are not among them stay.
@@ -136,7 +136,7 @@ def contacts_of_lines(
     range_m, range_s = message.range_m, np.where(np.isfinite(message.range_m), seen_s, np.nan)
     if before is not None:
         range_m, range_s = _hold_ranges(message.target, seen_s, range_m, range_s, before)
-    pose = own.poses(message.measured_tick)
+    pose = own.poses_at(message.measured_tick)
     body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
     ends = offset_positions(np.stack([north, east, down]) * range_m, pose[:, :3].T)
@@ -154,7 +154,9 @@ def contacts_of_lines(
 def _hold_ranges(
     number: IntArray, seen_s: FloatArray, range_m: FloatArray, range_s: FloatArray, before: Contacts
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the ranges, the previous one where none was measured, and when each was measured."""
+    """Return ranges and the times of their measurement, where missing the contact's previous range,
+    if not older than `RANGE_HELD_S`.
+    """
     order = np.argsort(before.number, kind="stable")
     known = before.number[order]
     index = np.searchsorted(known, number)
@@ -170,7 +172,7 @@ def _hold_ranges(
 
 
 def contacts_of_states(message: StateTracks, own: OwnFlight, ticks_per_s: int) -> Contacts:
-    """Return the contacts of one row of estimated states."""
+    """Return the contacts in one row of a tracker's state estimates, without deleted tracks."""
     lives = np.flatnonzero(message.track_status != DELETED)
     ranged = message.has_range[lives] & np.isfinite(message.north_m[lives])
     ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]

@@ -41,7 +41,7 @@ _LOOK_AGAIN_S = 0.25
 
 
 class LivePacer(Pacer):
-    """A pacer that waits while `holds()`, and tells how far the run has come, with the lag, s.
+    """A pacer that waits while `holds()` is true, and reports simulated time and lag, s.
 
     Simulated time runs at `factor` seconds per second of the clock.
     """
@@ -59,15 +59,17 @@ class LivePacer(Pacer):
 
     @property
     def longest_window_s(self) -> float:
-        """Simulated time that a window may hold, s."""
+        """Longest simulated time that the engine may compute between two waits, s."""
         return WINDOW_S * self.factor
 
     def wake(self) -> None:
-        """Look again whether to wait: something has changed. Any thread may call it."""
+        """Make the waiting run check at once whether it may go on; callable from any thread. Any
+        thread may call it.
+        """
         self._changed.set()
 
     def stop(self) -> None:
-        """End the run after the window that is under way."""
+        """Make the run end after the window that is being computed."""
         self.stopped = True
         self._changed.set()
 
@@ -91,7 +93,7 @@ class LivePacer(Pacer):
         self._wait_while_held()
 
     def _wait_while_held(self) -> None:
-        """Wait while the run is held; its clock stands still meanwhile."""
+        """Block while the run is held, and shift its start by that time, so that no lag arises."""
         began = self.now()
         while not self.stopped and self._holds():
             self._changed.wait(_LOOK_AGAIN_S)
@@ -101,7 +103,7 @@ class LivePacer(Pacer):
         self.paused_s += held_s
 
     def report(self) -> dict[str, float]:
-        """Return the factor, the lag, and for how long the run was held."""
+        """Return the pacer's figures, with ``paused_s``, the time in s that the run was held."""
         return {**super().report(), "paused_s": self.paused_s}
 
 
@@ -144,16 +146,16 @@ class SessionControl:
         self._log: list[dict[str, Any]] = []
 
     def attach(self, server: "DisplayServer", pacer: LivePacer, admission: Admission) -> None:
-        """Set the scope, the server and the desk to work with."""
+        """Set the server, the pacer and the admission that this session works with."""
         self._server, self._pacer, self._admission = server, pacer, admission
 
     # -- the thread of the simulation --------------------------------------------------------------
 
-    def holds(self) -> bool:
-        """Return whether the run waits: for its operator to be ready, or to come back."""
+    def is_held(self) -> bool:
+        """Return whether the run must wait; print a new address if the operator's page is gone."""
         if self._gone_at is not None and time.monotonic() - self._gone_at > GONE_S:
             self._gone_at = None
-            address = self._server.address(self._admission.renew())
+            address = self._server.page_url(self._admission.renew_token())
             say(f"the operator's page is gone; to decide again: {address}")
         if self._waits and not self._began:
             return True
@@ -161,19 +163,19 @@ class SessionControl:
 
     def show_time(self, time_s: float, lag_s: float) -> None:
         """Store the simulated time that the run has reached, and show it on the pages."""
-        self._now = time_s, lag_s, None if self.scope is None else self.scope.take_received()
+        self._now = time_s, lag_s, None if self.scope is None else self.scope.received_so_far()
         if self._gone_at is not None:
-            self.holds()
+            self.is_held()
         if self.scope is not None and len(self.scope.names) != self._named:
             self._named = len(self.scope.names)
-            self._server.tell({"type": "names", "names": self.scope.names})
+            self._server.broadcast({"type": "names", "names": self.scope.names})
         wall_s = time.perf_counter()
         if wall_s - self._shown_at >= max(FRAME_S, self._made_s / _SHARE):
             self._shown_at = wall_s
             self._server.announce_picture()
 
-    def sentence(self) -> str:
-        """Return a sentence on a decision, for the terminal."""
+    def decisions_sentence(self) -> str:
+        """Return a sentence on how many decisions were accepted, up to which simulated time."""
         taken = sum(answer["type"] == "taken" for answer in self._answers.values())
         return f"{taken} decision{'' if taken == 1 else 's'} taken in, up to {self._now[0]:.1f} s"
 
@@ -183,7 +185,7 @@ class SessionControl:
         """
         assert self.scope is not None
         answer: dict[str, Any] = {
-            "time": round(taken.time_s, 6), "level": self.scope.level_of(message.target)
+            "time": round(taken.time_s, 6), "level": self.scope.alert_level_of(message.target)
         }  # fmt: skip
         if isinstance(message, Judged) or not math.isfinite(taken.ends_s):
             return answer
@@ -228,7 +230,9 @@ class SessionControl:
         }
 
     def frame(self, chosen: int) -> dict[str, Any] | None:
-        """Return the newest picture; but for the camera's it is the same for all pages."""
+        """Return the newest picture of the display, with the camera's picture of the contact chosen
+        on a page; None without a display.
+        """
         scope = self.scope
         if scope is None:
             return None
@@ -243,7 +247,7 @@ class SessionControl:
             "lag": round(lag_s, 4),
             "operators": self._operators,
             **picture,
-            "camera": scope.camera(picture, time_s, chosen),
+            "camera": scope.camera_picture(picture, time_s, chosen),
         }
         self._made_s = time.thread_time() - began
         return content
@@ -262,7 +266,7 @@ class SessionControl:
             if not self._began:
                 self._began = True
                 self._pacer.wake()
-                self._server.tell({"type": "began"})
+                self._server.broadcast({"type": "began"})
         elif isinstance(message, Judged | Turned | Climbed):
             await self._decide(page, message)
 
@@ -278,7 +282,7 @@ class SessionControl:
             why = "nobody decides in this scene"
         elif name is None or self.scope is None:
             why = "there is no such target"
-        elif isinstance(message, Climbed) and self.scope.alt_m + message.value < 0.0:
+        elif isinstance(message, Climbed) and self.scope.own_alt_m + message.value < 0.0:
             why = "that leads below the ground"
         elif not self._submit(message, name):
             why = "the run is over, or too much was decided at once"
@@ -286,7 +290,7 @@ class SessionControl:
             await page.send({"type": "refused", "id": message.id, "why": why})
 
     def _submit(self, message: Judged | Turned | Climbed, name: str) -> bool:
-        """Pass a decision to the simulation; the page is informed once it is accepted."""
+        """Pass on an operator's decision; return whether it was queued; pages hear if accepted."""
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
         decision = OperatorDecision(
@@ -308,7 +312,7 @@ class SessionControl:
             answer = {"type": "taken", **content, **self._decision_fields(message, one)}
             self._answers[message.id] = answer
             self._log.append(answer)
-            self._server.tell(answer)
+            self._server.broadcast(answer)
 
         if self._desk.submit(PendingDecision(decision, taken)):
             return True

@@ -16,7 +16,7 @@ DIRECTIONS_RAD = np.arange(0.0, 2.0 * math.pi - 0.5 * STEP_RAD, STEP_RAD)
 
 
 class Reached(NamedTuple):
-    """How far from the ownship an area begins and ends, by direction clockwise from north."""
+    """The distances where a loss begins and ends, by direction of flight clockwise from north."""
 
     direction_rad: FloatArray
     near_m: FloatArray
@@ -30,7 +30,7 @@ def predicted_loss_area(
     relative: FloatArray,
     lookahead_s: float,
 ) -> Reached:
-    """Return where the ownship would be in a volume about other aircraft, were it to turn at once.
+    """Return by direction of a turn now, from which to which distance it would violate a volume.
 
     It keeps its speed and its vertical speed, and the others their flights; how long it takes to
     turn is left out. What an operator sees is where not to fly to, as the thesis has it (section

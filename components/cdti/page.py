@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
-from components.view.page import fill_page, page_part, page_program
+from components.view.page import fill_page_template, page_script_and_digest, read_page_file
 
 _PACKAGE = "components.cdti"
 #: The program's parts, in the order in which they need each other.
@@ -22,22 +22,22 @@ _MOST_DEG, _MOST_M = 180.0, 3000.0
 
 
 @cache
-def page() -> tuple[str, str]:
-    """Return the page, which holds nothing of the run, and its program's digest.
+def page_and_digest() -> tuple[str, str]:
+    """Return the HTML of the display page and the SHA-256 digest of its script.
 
     All that is said of a run comes over the socket, and is put on screen as text.
     """
-    script, digest = page_program(_PACKAGE, SCRIPTS)
-    contents = {"style": page_part(_PACKAGE, "style.css"), "script": script}
-    return fill_page(_PACKAGE, "cdti.html", contents), digest
+    script, digest = page_script_and_digest(_PACKAGE, SCRIPTS)
+    contents = {"style": read_page_file(_PACKAGE, "style.css"), "script": script}
+    return fill_page_template(_PACKAGE, "cdti.html", contents), digest
 
 
-def headers(socket_address: str) -> dict[str, str]:
-    """Return the headers with which the page is sent.
+def page_headers(socket_address: str) -> dict[str, str]:
+    """Return the page's HTTP headers, which allow only its own script and this socket.
 
     The browser may run the one program inside, talk to this server's socket, and nothing else.
     """
-    _, digest = page()
+    _, digest = page_and_digest()
     policy = (
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
         f"connect-src {socket_address}; base-uri 'none'; form-action 'none'; "
@@ -70,21 +70,21 @@ class Admission:
         self._key = ""
 
     def is_token(self, token: str) -> bool:
-        """Return whether a token is one of this run, used up or not."""
-        return any(_is_same_word(token, known) for known in self._watching)
+        """Return whether a token was issued in this run, even if it only lets watch by now."""
+        return any(_is_equal_in_constant_time(token, known) for known in self._watching)
 
-    def role(self, token: str, key: str) -> tuple[str, str]:
-        """Return what a page with a token of this run may do, and the key of who decides."""
-        if self._key and _is_same_word(key, self._key):
+    def role_and_key(self, token: str, key: str) -> tuple[str, str]:
+        """Return operator or watcher for this token and key, and the operator's key or empty."""
+        if self._key and _is_equal_in_constant_time(key, self._key):
             return OPERATOR, self._key
-        if self._fresh and _is_same_word(token, self.token):
+        if self._fresh and _is_equal_in_constant_time(token, self.token):
             self._fresh = False
             self._key = _new_token()
             return OPERATOR, self._key
         return WATCHER, ""
 
-    def renew(self) -> str:
-        """Return a token with which a page may decide again; the last one's key stays valid."""
+    def renew_token(self) -> str:
+        """Return a token to become operator, new if the last was used; earlier keys stay valid."""
         if not self._fresh:
             self.token, self._fresh = _new_token(), True
             self._watching.append(self.token)
@@ -95,7 +95,7 @@ def _new_token() -> str:
     return secrets.token_urlsafe(24)
 
 
-def _is_same_word(one: str, other: str) -> bool:
+def _is_equal_in_constant_time(one: str, other: str) -> bool:
     return compare_digest(one.encode("utf-8", "replace"), other.encode())
 
 
@@ -104,20 +104,20 @@ class _FromPage(BaseModel):
 
 
 class Ready(_FromPage):
-    """The operator is there: the run may begin."""
+    """The operator reports to be ready, so that the run may begin."""
 
     type: Literal["ready"]
 
 
 class Drawn(_FromPage):
-    """A frame is on screen: another one may be sent."""
+    """A page reports that it has drawn a frame, so that another one may be sent."""
 
     type: Literal["drawn"]
     frame: int = Field(ge=0, le=2**53)
 
 
 class Chosen(_FromPage):
-    """A contact was chosen, whose camera picture is wanted."""
+    """A page asks for the camera's picture of this contact."""
 
     type: Literal["chosen"]
     target: int = Field(ge=-1, le=10**7)

@@ -54,7 +54,7 @@ _UNKNOWN = (None, None, None)
 
 @dataclass(frozen=True)
 class _Alerts:
-    """The latest alerts: targets with what is known of their flights, at an instant."""
+    """The latest alerts at one instant: contacts, levels, relative states and time to loss."""
 
     time_s: float
     target: Any
@@ -109,7 +109,7 @@ class Scope:
         self._names: tuple[str, ...] = ()
         #: Names of all targets, fit to be shown.
         self.names: list[str] = []
-        self._rules = _rules_of(components)
+        self._rules = _alerting_rules(components)
         senders = {
             type_of
             for block in components.values()
@@ -122,29 +122,29 @@ class Scope:
 
     # -- the thread of the simulation ------------------------------------------------------------
 
-    def listen(self, block: str, message: Message) -> None:
-        """Store a message that a block has sent."""
+    def store_message(self, block: str, message: Message) -> None:
+        """Store what the display shows of a message that a block on its platform has sent."""
         if len(message) == 0 or block not in self._on_board:
             return
         if isinstance(message, TrafficStates):
             message = message.seen_from(self._platform or message.roster.own_name)
-            self._own.take(message, self._per_s)
+            self._own.store_states(message, self._per_s)
             self._sights.states = message
-            self._name(message.roster.names)
+            self._store_names(message.roster.names)
         elif isinstance(message, Detections):
             self._heard = {**self._heard, block: int(message.tick[-1]) / self._per_s}
-            self._sights.take(block, message, self._per_s)
-            self._take_reports(message)
+            self._sights.store_detections(block, message, self._per_s)
+            self._store_reports(message)
         elif isinstance(message, AlertLevels):
-            self._take_alerts(message)
+            self._store_alerts(message)
         elif isinstance(message, GuidanceBands):
             last = message.take(slice(len(message) - 1, len(message)))
             self._bands = int(last.tick[0]) / self._per_s, last
         elif self._believed is not None and isinstance(message, self._believed):
-            self._take_contacts(message)
+            self._store_contacts(message)
 
-    def _take_reports(self, message: Detections) -> None:
-        """Store the aircraft's own position reports, if the message has any."""
+    def _store_reports(self, message: Detections) -> None:
+        """Store altitude and climb reported by aircraft, if the detections hold any."""
         if "reported_alt_m" not in message.extras:
             return
         altitude, climb = (message.extras[f"reported_{name}"] for name in ("alt_m", "climb_m_s"))
@@ -153,7 +153,7 @@ class Scope:
         new = {int(target): (float(a), float(c), float(s)) for target, a, c, s in rows}
         self._reported = {**self._reported, **new}
 
-    def _take_contacts(self, message: Message) -> None:
+    def _store_contacts(self, message: Message) -> None:
         count = len(message)
         if isinstance(message, StateTracks):
             last = message.take(slice(count - 1, count))
@@ -163,22 +163,22 @@ class Scope:
                 one = message.take(slice(row, row + 1))
                 self._contacts = contacts_of_lines(one, self._own, self._per_s, self._contacts)
 
-    def _name(self, names: tuple[str, ...]) -> None:
+    def _store_names(self, names: tuple[str, ...]) -> None:
         if names is not self._names:
             self._names, self.names = names, [printable(name) for name in names]
 
-    def _take_alerts(self, message: AlertLevels) -> None:
-        contacts = message.contacts()
+    def _store_alerts(self, message: AlertLevels) -> None:
+        contacts = message.contact_numbers()
         for row, tick in enumerate(message.tick.tolist()):  # an alert goes on from row to row
             of = slice(int(message.offsets[row]), int(message.offsets[row + 1]))
             on = sorted(contacts[of][message.level[of] > 0].tolist())
             self._since = {t: self._since.get(t, tick / self._per_s) for t in on}
         last = message.take(slice(len(message) - 1, len(message)))
-        contacts = last.contacts()
+        contacts = last.contact_numbers()
         times = [last.times[name] for name in sorted(last.times)]
         with np.errstate(invalid="ignore"):
             to_loss = np.fmin.reduce(times) if times else np.full(len(contacts), np.nan)
-        self._name(last.roster.names)
+        self._store_names(last.roster.names)
         self._alerts = _Alerts(
             int(last.tick[0]) / self._per_s,
             contacts,
@@ -193,22 +193,22 @@ class Scope:
     # -- any thread ------------------------------------------------------------------------------
 
     @property
-    def alt_m(self) -> float:
+    def own_alt_m(self) -> float:
         """The ownship's altitude; infinite before it is known."""
         return math.inf if self._own.now is None else self._own.now.alt_m
 
     def name_of(self, contact: int) -> str | None:
-        """Return a contact's name as the run has it; empty for none, None if there is none."""
+        """Return a contact's name recorded by the run; empty if unnamed, None for no contact."""
         return contact_name(self._names, contact)
 
-    def take_received(self) -> Received:
-        """Return all that was received until now; between two windows it is of one instant."""
+    def received_so_far(self) -> Received:
+        """Return an unchanging view of everything received so far; nothing is cleared."""
         return Received(
             self._own.now, self._contacts, self._alerts, self._since, self._reported, self._bands,
             self._heard,
         )  # fmt: skip
 
-    def level_of(self, contact: int) -> int:
+    def alert_level_of(self, contact: int) -> int:
         """Return the level of the alert on a contact, 0 without one."""
         if self._alerts is None:
             return 0
@@ -224,9 +224,11 @@ class Scope:
         return round(own.alt_m + value, 1)
 
     def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
-        """Return the picture of the display at an instant, for JSON: m, deg, s."""
+        """Return what the page shows at an instant, for JSON (m, deg, s): own state, contacts,
+        alerts, loss area, bands and failed sensors.
+        """
         own, contacts, alerts, since, reported, bands, heard = (
-            self.take_received() if received is None else received
+            self.received_so_far() if received is None else received
         )
         if own is None:
             return {
@@ -243,9 +245,9 @@ class Scope:
             if self._looked is None or self._looked[0] is not alerts:
                 self._looked = (
                     alerts,
-                    _flights(alerts),
+                    _velocities_by_contact(alerts),
                     _alert_fields(alerts, since),
-                    self._area(alerts),
+                    self._loss_area(alerts),
                 )
             _, flights, said, area = self._looked
         level = {one["target"]: one["level"] for one in said}
@@ -271,8 +273,10 @@ class Scope:
             "out": silent_sensors(self._silence_s, heard, time_s),
         }
 
-    def camera(self, picture: dict[str, Any], time_s: float, chosen: int) -> dict[str, Any] | None:
-        """Return the camera's picture of a contact of a `picture`, or None where there is none.
+    def camera_picture(
+        self, picture: dict[str, Any], time_s: float, chosen: int
+    ) -> dict[str, Any] | None:
+        """Return the newest camera picture of a contact, as of an instant; None if never seen.
 
         Of contact -1 it is that of the most urgent one.
         """
@@ -288,7 +292,7 @@ class Scope:
         return self._sights.picture(chosen, self._direction_of(chosen), time_s, own)
 
     def _direction_of(self, contact: int) -> tuple[float, float] | None:
-        """Return the bearing and elevation of a contact as it was seen last, rad."""
+        """Return a contact's last bearing from north and elevation, rad; None if it is unknown."""
         contacts = self._contacts
         if contacts is None:
             return None
@@ -298,7 +302,7 @@ class Scope:
         bearing, elevation = contacts.toward[index[0]].tolist()
         return bearing, elevation
 
-    def _area(self, alerts: _Alerts) -> list[list[float]]:
+    def _loss_area(self, alerts: _Alerts) -> list[list[float]]:
         on = np.flatnonzero(alerts.level > 0)
         if self._rules is None or len(on) == 0 or not np.all(np.isfinite(alerts.own_mps)):
             return []
@@ -321,7 +325,9 @@ class Scope:
 def _bands_at(
     received: tuple[float, GuidanceBands] | None, time_s: float
 ) -> dict[str, list[list[Any]]]:
-    """Return bands by kind as [from, to, region]: deg clockwise from north, m, m/s."""
+    """Return the guidance bands valid at an instant, by kind, as lists of [from, to, region]: deg
+    clockwise from north, m, m/s.
+    """
     result: dict[str, list[list[Any]]] = {kind: [] for kind in BAND_KINDS}
     if received is None or time_s - received[0] > BANDS_LAST_S:
         return result
@@ -355,8 +361,10 @@ def _alert_fields(alerts: _Alerts, since: dict[int, float]) -> list[dict[str, An
     return sorted(result, key=lambda one: (-one["level"], one["to_loss"] or 0.0, one["target"]))
 
 
-def _flights(alerts: _Alerts) -> dict[int, list[float]]:
-    """Return east, north and upward velocity of the targets that the alerting knows, m/s."""
+def _velocities_by_contact(alerts: _Alerts) -> dict[int, list[float]]:
+    """Return east, north and upward velocity, m/s, of each contact known to the alerting; empty
+    while the own velocity is unknown.
+    """
     moving = alerts.own_mps[:, np.newaxis] - alerts.relative[3:]
     if not np.all(np.isfinite(moving)):
         return {}
@@ -365,7 +373,7 @@ def _flights(alerts: _Alerts) -> dict[int, list[float]]:
 
 
 def _display_platform(simulation: Simulation, platform: str | None) -> str:
-    """Return what carries a display: what is asked for, else what carries the console.
+    """Return the displayed platform's name: as asked, else the one with the operator's console.
 
     Empty where nothing is known to carry a block; `UsageError` for what carries none.
     """
@@ -385,8 +393,8 @@ def _display_platform(simulation: Simulation, platform: str | None) -> str:
     return platform or next(iter([*consoles, *first, *known]), "")
 
 
-def _rules_of(components: Mapping[str, Component]) -> tuple[Configuration, Alerter] | None:
-    """Return the configuration and the alerter of the alerting block, if there is one."""
+def _alerting_rules(components: Mapping[str, Component]) -> tuple[Configuration, Alerter] | None:
+    """Return configuration and alerter of the first block sending alert levels; None without."""
     from components.alert_configuration.conf_file import read_conf
 
     for component in components.values():

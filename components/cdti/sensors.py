@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from components.messages.detections import Detections, SensorOffer
-from components.sensor.marks import IR
+from components.sensor.palette import IR
 from dsa_des.block.component import Component
 from dsa_des.running.simulation import Simulation
 from dsa_des.text.safe_text import printable
@@ -15,14 +15,14 @@ _SILENT_SCANS, _SILENT_S = 2.5, 1.0
 
 
 def describe_sensors(components: Mapping[str, Component]) -> list[dict[str, Any]]:
-    """Return where each sensor looks, deg and m; what is not known is None."""
+    """Return each sensor's name, kind, range (m), azimuth limits (deg); None where unknown."""
     return [_describe(name, one) for name, one in sorted(components.items()) if _is_sensor(one)]
 
 
 def silent_sensors(
     longest_s: Mapping[str, float], heard_s: Mapping[str, float], time_s: float
 ) -> list[str]:
-    """Return which sensors have been silent for too long, given when each was heard of last."""
+    """Return names of sensors silent for longer than they may be, by when each was last heard."""
     return [
         printable(name)
         for name, most_s in longest_s.items()
@@ -31,7 +31,7 @@ def silent_sensors(
 
 
 def longest_silences_s(simulation: Simulation) -> dict[str, float]:
-    """Return after which silence each sensor is out, s: those that are switched on at the start."""
+    """Return each initially active sensor's silence, s, after which it counts as failed."""
     scene, result = simulation.scene, dict[str, float]()
     for name, component in sorted(simulation.components.items()):
         if not _is_sensor(component) or not getattr(component.p, "enabled", True):

@@ -26,8 +26,8 @@ from components.cdti.page import (
     Admission,
     Drawn,
     PageMessage,
-    headers,
-    page,
+    page_and_digest,
+    page_headers,
     read_message,
 )
 from dsa_des.errors import UsageError
@@ -54,12 +54,12 @@ class Page:
         self._free.set()
 
     def note_drawn(self, frame: int) -> None:
-        """Record that a page has drawn a picture."""
+        """Record that a page has drawn this frame, and let it have another if not far behind."""
         self._drawn = max(self._drawn, min(frame, self._sent))
         if self._sent - self._drawn < _AHEAD:
             self._free.set()
 
-    async def ready(self) -> None:
+    async def wait_until_ready(self) -> None:
         """Wait until the page can take another picture."""
         await self._free.wait()
 
@@ -68,12 +68,12 @@ class Page:
         self._sent += 1
         if self._sent - self._drawn >= _AHEAD:
             self._free.clear()
-        await self.connection.send(_json({**content, "frame": self._sent}))
+        await self.connection.send(_to_json({**content, "frame": self._sent}))
 
     async def send(self, content: dict[str, Any]) -> None:
-        """Send anything else; a connection that is gone is no matter."""
+        """Send a message other than a picture; nothing happens if the connection is gone."""
         with suppress(ConnectionClosed):
-            await self.connection.send(_json(content))
+            await self.connection.send(_to_json(content))
 
 
 class PageControl(Protocol):
@@ -100,7 +100,7 @@ class DisplayServer:
         self._admission, self._control = admission, control
         self.pages: list[Page] = []
         self.loop = asyncio.new_event_loop()
-        self._thread = threading.Thread(target=self._live, name="display", daemon=True)
+        self._thread = threading.Thread(target=self._run_server_loop, name="display", daemon=True)
         self._up, self._failed = threading.Event(), ""
         self._new: asyncio.Condition
         self._number = 0
@@ -109,7 +109,7 @@ class DisplayServer:
     # -- other threads -----------------------------------------------------------------------------
 
     def start(self) -> None:
-        """Serve from now on; `UsageError` if the address cannot be."""
+        """Start the thread that serves the page; UsageError if the address cannot be used."""
         self._thread.start()
         if not self._up.wait(_START_S) or self._failed:
             raise UsageError(f"cannot serve at {self.authority}: {self._failed or 'no answer'}")
@@ -120,17 +120,17 @@ class DisplayServer:
         host = f"[{self._host}]" if ":" in self._host else self._host
         return f"{host}:{self._port}"
 
-    def address(self, token: str) -> str:
-        """Return the address of the page."""
+    def page_url(self, token: str) -> str:
+        """Return the URL of the page with this token."""
         return f"http://{self.authority}/?token={token}"
 
     def announce_picture(self) -> None:
         """Wake every page, so that each sends the new picture when its client is ready."""
-        self._call_from_outside(self._announce)
+        self._call_in_server_loop(self._wake_pages)
 
-    def tell(self, content: dict[str, Any]) -> None:
+    def broadcast(self, content: dict[str, Any]) -> None:
         """Send a message to every page."""
-        self._call_from_outside(lambda: self._send_to_all(content))
+        self._call_in_server_loop(lambda: self._send_to_all(content))
 
     def close(self, last: dict[str, Any]) -> None:
         """Send a last message to every page and stop the server."""
@@ -141,10 +141,10 @@ class DisplayServer:
             await self._send_to_all(last)
             self._stop.set()
 
-        self._call_from_outside(leave)
+        self._call_in_server_loop(leave)
         self._thread.join(_END_S)
 
-    def _call_from_outside(self, call: Callable[[], Awaitable[None]]) -> None:
+    def _call_in_server_loop(self, call: Callable[[], Awaitable[None]]) -> None:
         async def run() -> None:
             await call()
 
@@ -153,15 +153,15 @@ class DisplayServer:
 
     # -- its own thread ----------------------------------------------------------------------------
 
-    def _live(self) -> None:
+    def _run_server_loop(self) -> None:
         asyncio.set_event_loop(self.loop)
         try:
-            self.loop.run_until_complete(self._serve())
+            self.loop.run_until_complete(self._serve_until_stopped())
         finally:
             self.loop.close()
             self._up.set()
 
-    async def _serve(self) -> None:
+    async def _serve_until_stopped(self) -> None:
         self._new, self._stop = asyncio.Condition(), asyncio.Event()
         quiet = logging.getLogger(f"{__name__}.connections")
         quiet.setLevel(logging.CRITICAL)  # what anybody sends is no matter of the terminal's
@@ -172,7 +172,7 @@ class DisplayServer:
                 self._serve_page,
                 self._host,
                 self._port,
-                process_request=self._answer,
+                process_request=self._answer_request,
                 max_size=LARGEST_BYTES,
                 compression=None,
                 server_header=None,
@@ -190,20 +190,22 @@ class DisplayServer:
         await self._stop.wait()
         await _wait_closed(server)
 
-    def _answer(self, connection: ServerConnection, request: Request) -> Response | None:
-        """Answer a request: with the page, with a socket, or with what is wrong."""
+    def _answer_request(self, connection: ServerConnection, request: Request) -> Response | None:
+        """Return the response to an HTTP request: page or error; None lets the socket be opened."""
         parts = urlsplit(request.path)
         hosts = request.headers.get_all("Host")
         if hosts != [self.authority]:  # another name for this address: a page of somewhere else
             return connection.respond(403, "not this host\n")
-        if not self._admission.is_token(_token(request)):
+        if not self._admission.is_token(_token_of_request(request)):
             return connection.respond(
                 403, "the address lacks its token, or it is not of this run\n"
             )
         if parts.path == "/":
-            text, _ = page()
+            text, _ = page_and_digest()
             body = text.encode("utf-8")
-            sent = Headers({**headers(f"ws://{self.authority}"), "Content-Length": str(len(body))})
+            sent = Headers(
+                {**page_headers(f"ws://{self.authority}"), "Content-Length": str(len(body))}
+            )
             sent["Connection"] = "close"
             return Response(200, "OK", sent, body)
         if parts.path != SOCKET:
@@ -216,21 +218,21 @@ class DisplayServer:
         return None
 
     async def _serve_page(self, connection: ServerConnection) -> None:
-        """Live with one page until it goes."""
+        """Serve one page over its socket until it closes: welcome, pictures, and its messages."""
         assert connection.request is not None
         query = parse_qs(urlsplit(connection.request.path).query)
         deciding = [page for page in self.pages if page.role == OPERATOR]
         # A browser that had the key is known by it again, but takes nobody's place.
         names = ("key",) if deciding else ("key", "before")
         known = next((query[name][0] for name in names if query.get(name)), "")
-        role, key = self._admission.role(_token(connection.request), known)
+        role, key = self._admission.role_and_key(_token_of_request(connection.request), known)
         if role == OPERATOR:
             for other in deciding:
                 other.role = "replaced"
                 await other.connection.close(4001, "opened elsewhere")
         page = Page(connection, role)
         self.pages.append(page)
-        self._count()
+        self._report_operator_count()
         feeding = None
         try:
             await page.send(
@@ -238,19 +240,19 @@ class DisplayServer:
             )
             feeding = asyncio.create_task(self._send_pictures(page))
             async for text in connection:
-                await self._receive(page, text)
+                await self._handle_text(page, text)
         except ConnectionClosed:
             pass
         finally:
             if feeding is not None:
                 feeding.cancel()
             self.pages.remove(page)
-            self._count()
+            self._report_operator_count()
 
-    def _count(self) -> None:
+    def _report_operator_count(self) -> None:
         self._control.on_operators(sum(page.role == OPERATOR for page in self.pages))
 
-    async def _receive(self, page: Page, text: str | bytes) -> None:
+    async def _handle_text(self, page: Page, text: str | bytes) -> None:
         try:
             message = read_message(text)
         except ValueError as error:
@@ -266,7 +268,7 @@ class DisplayServer:
         seen = 0
         with suppress(ConnectionClosed):
             while True:
-                await page.ready()
+                await page.wait_until_ready()
                 async with self._new:
                     while self._number == seen:
                         await self._new.wait()
@@ -275,7 +277,7 @@ class DisplayServer:
                 if content is not None:
                     await page.send_frame(content)
 
-    async def _announce(self) -> None:
+    async def _wake_pages(self) -> None:
         async with self._new:
             self._number += 1
             self._new.notify_all()
@@ -287,7 +289,7 @@ class DisplayServer:
 
 
 class ConnectionLimit:
-    """Drops connections beyond a limit at once, and says so in one line."""
+    """Drops connections beyond a limit at once, and prints one warning about it."""
 
     def __init__(self, say: Callable[[str], None], most: int = MOST_CONNECTIONS) -> None:
         self._say, self._most = say, most
@@ -295,7 +297,7 @@ class ConnectionLimit:
         self._said = self._starved = False
 
     def make_connection(self, *given: Any, **options: Any) -> ServerConnection:
-        """Return a connection object for `websockets.asyncio.server.serve` that is limited."""
+        """Return a connection for `websockets.asyncio.server.serve`, dropped beyond the limit."""
         return _Limited(self, *given, **options)
 
     def count_opened(self) -> bool:
@@ -311,7 +313,7 @@ class ConnectionLimit:
         self._open -= 1
 
     def on_error(self, loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle errors of the event loop: connections may come faster than they can be dropped."""
+        """Handle errors of the event loop; report too many open files once, not as errors."""
         error = context.get("exception")
         if isinstance(error, OSError) and error.errno in (errno.EMFILE, errno.ENFILE):
             self._starved = True
@@ -351,11 +353,11 @@ class _Limited(ServerConnection):
             super().connection_lost(error)
 
 
-def _token(request: Request) -> str:
+def _token_of_request(request: Request) -> str:
     return parse_qs(urlsplit(request.path).query).get("token", [""])[0]
 
 
-def _json(content: dict[str, Any]) -> str:
+def _to_json(content: dict[str, Any]) -> str:
     return json.dumps(content, allow_nan=False, separators=(",", ":"))
 
 

@@ -13,7 +13,7 @@ from components.cdti.page import Admission
 from components.cdti.scope import Scope
 from components.operator.human import Desk, Human
 from components.operator.recorded import RecordedOperator
-from dsa_des.commands.scene import check_command
+from dsa_des.commands.scene import text_of_check_command
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.library.scenes import load_scene
@@ -61,20 +61,20 @@ def run_session(
     # By its whole path, so that the run folder's scene finds its files from wherever it is run.
     path = Path(os.path.abspath(find_input_file(scene, "scene")))
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
-    console = _console(loaded)
+    console = _console_block(loaded)
     target = OutputFolder.from_option(out, Path("runs"), loaded.path.stem)
     target.check()
-    replay = _replay(loaded, console, target.path)
+    replay = _scene_for_replay(loaded, console, target.path)
     desk = Desk()
     control = SessionControl(
         loaded, desk, console, speed, units, waits=not no_wait and console is not None
     )
     admission = Admission()
     server = DisplayServer(host, port, admission, control)
-    pacer = LivePacer(speed, control.holds, control.show_time)
+    pacer = LivePacer(speed, control.is_held, control.show_time)
     control.attach(server, pacer, admission)
     server.start()
-    say(f"display: {server.address(admission.token)}")
+    say(f"display: {server.page_url(admission.token)}")
     say(f"{_WATCHED if console is None else _DECIDED} Ctrl-C ends the run.")
     if host not in _LOOPBACK:
         open_to = f"note: others in the network of {host} can reach it"
@@ -83,7 +83,7 @@ def run_session(
     def prepare(simulation: Simulation) -> None:
         scope = Scope(simulation, platform)
         if simulation.recorder is not None:
-            simulation.recorder.listeners.append(scope.listen)
+            simulation.recorder.listeners.append(scope.store_message)
         if console is not None:
             block = simulation.components[console]
             assert isinstance(block, Human)
@@ -93,12 +93,12 @@ def run_session(
     ended = "the run was broken off"
     received: list[int] = []
     try:
-        with _stopping(pacer, received):
+        with _stop_on_signals(pacer, received):
             summary = record_run(
                 loaded,
                 target,
                 silent=True,
-                notes_command=check_command(scene, sets, swaps, seed, duration),
+                notes_command=text_of_check_command(scene, sets, swaps, seed, duration),
                 pacer=pacer,
                 draw=not no_figures,
                 prepare=prepare,
@@ -108,13 +108,15 @@ def run_session(
     finally:
         desk.close()
         server.close({"type": "end", "why": ended})
-    say(f"run: {printable(str(summary['out']))}: {control.sentence()}; {pacer.sentence()}")
+    say(
+        f"run: {printable(str(summary['out']))}: {control.decisions_sentence()}; {pacer.sentence()}"
+    )
     if received:
         raise KeyboardInterrupt if received[0] == signal.SIGINT else Terminated(received[0])
 
 
-def _console(scene: Scene) -> str | None:
-    """Return the name of the block at which a person sits, or None: a scene to be watched."""
+def _console_block(scene: Scene) -> str | None:
+    """Return the block at which a person decides (name); None for a scene that is only watched."""
     result = [name for name, cls in scene.classes.items() if issubclass(cls, Human)]
     if len(result) > 1:
         raise UsageError(
@@ -124,8 +126,10 @@ def _console(scene: Scene) -> str | None:
     return result[0] if result else None
 
 
-def _replay(scene: Scene, console: str | None, target: Path) -> Scene | None:
-    """Return the scene that gives the same tables with what was decided instead of a person."""
+def _scene_for_replay(scene: Scene, console: str | None, target: Path) -> Scene | None:
+    """Return the scene with the console replaced by the decisions recorded in this run, which gives
+    the same tables; None without a console.
+    """
     if console is None:
         return None
     table = (target / "decisions.parquet").absolute()
@@ -149,7 +153,7 @@ def _check_host(host: str) -> None:
 
 
 @contextmanager
-def _stopping(pacer: LivePacer, received: list[int]) -> Iterator[None]:
+def _stop_on_signals(pacer: LivePacer, received: list[int]) -> Iterator[None]:
     """Make ctrl-C and SIGTERM end the run at its next instant; a second signal aborts it."""
 
     def handle(number: int, frame: FrameType | None) -> None:

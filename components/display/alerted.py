@@ -29,33 +29,33 @@ class Alerted:
 
     @classmethod
     def read(cls, folder: Path) -> "Alerted":
-        """Read a run folder; what was not recorded is none."""
+        """Return a run folder's recorded alerts and manoeuvres; empty where not recorded."""
         names = [n for n in ("alerts", "manoeuvres") if (folder / f"{n}.parquet").is_file()]
         run = RecordedTables(folder, {n: read_table(folder / f"{n}.parquet") for n in names})
         result = cls()
         if "manoeuvres" in names:
             result.manoeuvres = _manoeuvre_times_by_platform(run)
         if "alerts" in names and run.tables["alerts"].num_rows:
-            result.stretches = _stretches(run)
+            result.stretches = _alert_stretches_by_target(run)
         return result
 
     @property
     def manoeuvres_s(self) -> FloatArray:
-        """Times of all commanded manoeuvres, s."""
+        """Times of the commanded manoeuvres of all platforms, s, ascending and each once."""
         return np.unique(np.concatenate([np.empty(0), *self.manoeuvres.values()]))
 
     @property
     def levels(self) -> list[int]:
-        """The levels that there were, ascending."""
+        """Alert levels that occurred in the run, ascending."""
         return sorted({level for mine in self.stretches.values() for level, _, _ in mine})
 
-    def key(self) -> list[Any]:
-        """Return the legend's entries for the alert levels."""
+    def legend_entries(self) -> list[Any]:
+        """Return Matplotlib legend handles, one per occurred alert level, one for manoeuvres."""
         from matplotlib.lines import Line2D
 
         handles = []
         for level in self.levels:
-            colour, width = style_of(level)
+            colour, width = alert_style(level)
             line = Line2D([], [], color=colour, linewidth=width, label=f"alert {level}")
             line.set_solid_capstyle("butt")
             handles.append(line)
@@ -64,25 +64,25 @@ class Alerted:
         return handles
 
 
-def style_of(level: int) -> tuple[str, float]:
-    """Return colour and width of an alert of a level."""
+def alert_style(level: int) -> tuple[str, float]:
+    """Return colour and line width in which an alert of this level is drawn."""
     return _LEVELS[min(level, len(_LEVELS)) - 1]
 
 
 def _manoeuvre_times_by_platform(run: RecordedTables) -> dict[str, FloatArray]:
-    """Return the times of manoeuvres by whom they steer."""
+    """Return manoeuvre times, s, by name of the platform that flies; empty where not recorded."""
     time_s = run.numbers("manoeuvres", "time_s")
     on = np.full(len(time_s), "", dtype=object)
-    if run.has("manoeuvres", "platform"):
+    if run.has_columns("manoeuvres", "platform"):
         on[:] = run.texts("manoeuvres", "platform")
     return {name: np.unique(time_s[on == name]) for name in sorted(set(on.tolist()))}
 
 
-def _stretches(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
-    """Return the alerts of each target; each lasts until what alerts looks again."""
+def _alert_stretches_by_target(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
+    """Return each target's alerts (level, begin, end in s), lasting to the alerter's next scan."""
     level = run.numbers("alerts", "level").astype(np.int64)
     time_s = run.numbers("alerts", "time_s")
-    block = np.array(run.texts("alerts", "block") if run.has("alerts", "block") else [""])
+    block = np.array(run.texts("alerts", "block") if run.has_columns("alerts", "block") else [""])
     block = np.broadcast_to(block, level.shape)
     each = {name: np.unique(time_s[block == name]) for name in np.unique(block).tolist()}
     last = {n: float(t[-1] + (np.median(np.diff(t)) if len(t) > 1 else 0)) for n, t in each.items()}
@@ -112,7 +112,7 @@ def _stretches(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]
 def draw_alerted_lines(
     axes: Any, alerted: Alerted, lines: dict[str, tuple[FloatArray, FloatArray, FloatArray]]
 ) -> None:
-    """Draw alerts under the lines of their targets, each given as times (s), x and y."""
+    """Draw, below targets' lines, parts flown under alert in its colour: times (s), x and y."""
     from matplotlib.collections import LineCollection
 
     segments, colours, widths = [], [], []
@@ -123,7 +123,7 @@ def draw_alerted_lines(
             points = np.column_stack((np.interp(at, time_s, x), np.interp(at, time_s, y)))
             if not np.isfinite(points).all():
                 points = points[np.isfinite(points).all(axis=1)]
-            colour, width = style_of(level)
+            colour, width = alert_style(level)
             segments.append(points)
             colours.append(colour)
             widths.append(width)

@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import NEAR_M, distances
+from components.display.outcomes import NEAR_M, distances_to_targets
 from components.display.tracks import COLOURS, MOST_SPREADS, STATE, DrawnTracks
-from components.messages.state_tracks import full_covariance
+from components.messages.state_tracks import covariance_matrices
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
-from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, set_plain_log_ticks
 from dsa_des.results.statistics import chi_square_bounds
 
 _MOST_ERRORS = 2000
@@ -18,21 +18,22 @@ _LOWEST, _HIGHEST = 0.02, 1000.0
 _STRETCHES = 40
 
 
-def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return normalised errors squared of a track to the nearest target, and where it has one.
+def nees_of_nearest_target(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
+    """Return the normalised error squared of each row of a track against its nearest target, and
+    whether one is within `NEAR_M`.
 
     States (targets, 6, rows) are those of the targets at the same times.
     """
     count = len(one["state_s"])
     if len(states) == 0:
         return np.full(count, np.nan), np.zeros(count, dtype=bool)
-    apart = distances(one, slice(None), states[:, :3])
+    apart = distances_to_targets(one, slice(None), states[:, :3])
     apart = np.where(np.isnan(apart), np.inf, apart)
     nearest: IntArray = apart.argmin(axis=0)
     rows = np.arange(count)
     known = apart[nearest, rows] < NEAR_M
     error = np.stack([one[name] for name in STATE]) - states[nearest, :, rows].T
-    spread = np.moveaxis(full_covariance(one, slice(None)), -1, 0).copy()
+    spread = np.moveaxis(covariance_matrices(one, slice(None)), -1, 0).copy()
     result = np.full(count, np.nan)
     solved = np.linalg.solve(spread[known], error.T[known][:, :, np.newaxis])[:, :, 0]
     result[known] = (error.T[known] * solved).sum(axis=1)
@@ -40,7 +41,7 @@ def errors_squared(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray,
 
 
 def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
-    """Draw normalised errors squared of tracks, and of what they expected of detections.
+    """Draw the tracks' normalised squared errors and innovations over time, with 95 % bounds.
 
     A row of a track that has a target counts; the bounds hold 95 % of consistent ones. None is
     drawn where no track is near a target.
@@ -49,7 +50,9 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
     for track in drawn.tracks:
         count = len(track.columns["state_s"])
         one = {k: v[:: max(1, count // _MOST_ERRORS)] for k, v in track.columns.items()}
-        result, known = errors_squared(one, drawn.seen_by[track.block].states(one["state_s"]))
+        result, known = nees_of_nearest_target(
+            one, drawn.seen_by[track.block].states(one["state_s"])
+        )
         if known.any():
             shown.append((track, one["state_s"], result))
     if not shown:
@@ -90,7 +93,7 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
         errors.set_yscale("log")
         bottom, top = errors.get_ylim()
         errors.set_ylim(max(bottom, _LOWEST), min(max(top, 20.0), _HIGHEST))
-        plain_log_ticks(errors.yaxis)
+        set_plain_log_ticks(errors.yaxis)
         innovations.set_ylim(bottom=0.0)
         innovations.set_xlabel("time (s)")
         fit_axes_to_texts(figure)
@@ -128,7 +131,7 @@ def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
     for index, block in enumerate(drawn.blocks):
         held = [one.columns for one in drawn.tracks if one.block == block]
         label = figure_text(block, 16) if len(drawn.blocks) > 1 else ""
-        _draw_innovations_of(axes, held, drawn.time_s, COLOURS[index % len(COLOURS)], label)
+        _draw_innovations_of_tracker(axes, held, drawn.time_s, COLOURS[index % len(COLOURS)], label)
     if drawn.blocks[1:]:
         axes.set_title(
             "Innovation squared by its covariance (NIS) per quantity, stretches inside "
@@ -139,7 +142,7 @@ def _draw_innovations(axes: Any, drawn: DrawnTracks) -> None:
         axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
 
 
-def _draw_innovations_of(
+def _draw_innovations_of_tracker(
     axes: Any,
     held: list[dict[str, Any]],
     span_s: tuple[float, float],

@@ -44,7 +44,7 @@ class Track:
 
 
 class Flights:
-    """Where the aircraft of a traffic source are, in a frame tangent at the ownship's start.
+    """Positions of all aircraft over time, east and north in km in the plane at the own start.
 
     The time of a target's closest approach becomes a point of its track; of very many targets only
     the nearest have tracks.
@@ -58,14 +58,14 @@ class Flights:
         nearest_m: dict[str, float] | None = None,
     ) -> None:
         self._source = source
-        chosen = _nearest(source.targets, nearest_m or {})
+        chosen = _targets_to_draw(source.targets, nearest_m or {})
         self._targets = {target.name: target for target in chosen}
         #: How many targets there are, with a track or without.
         self.all_targets = len(source.targets)
         self._closest_s = closest_s
         self.duration_s = duration_s
         count = int(np.clip(MOST_POINTS // (len(self._targets) + 1), 60, 600))
-        times = _times(source.own, duration_s, count)
+        times = _times_present(source.own, duration_s, count)
         own = source.own_at(times)
         start = int(np.argmax(own.present))
         #: Latitude and longitude in degrees and altitude in metres of the map's origin.
@@ -73,9 +73,9 @@ class Flights:
         self.start_s = float(times[start])
         #: Where the ownship's nose points at its start, clockwise from north.
         self.start_yaw_rad = float(own.yaw_rad[start])
-        east, north = self._map(own)
-        self.own = Track("ownship", times, east, north, np.zeros(len(times)), _altitude(own))
-        self.targets = [self._track(target, count) for target in chosen]
+        east, north = self._project_km(own)
+        self.own = Track("ownship", times, east, north, np.zeros(len(times)), _altitude_or_nan(own))
+        self.targets = [self._make_track(target, count) for target in chosen]
 
     @classmethod
     def from_simulation(cls, simulation: Simulation, summary: dict[str, Any]) -> "Flights | None":
@@ -92,48 +92,46 @@ class Flights:
                 return cls(component, float(simulation.duration_s), closest_s, nearest_m)
         return None
 
-    def position_at(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return east and north of a target in km at some times; NaN where it is not known."""
+    def east_north_km(self, name: str, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return an aircraft's east and north, km, at these times; NaN if unknown or absent."""
         target = self._targets.get(name)
         if target is None and name == self._source.roster.own_name:
-            return self.ownship_position_at(time_s)
+            return self.own_east_north_km(time_s)
         if target is None:
             nothing = np.full(len(time_s), np.nan)
             return nothing, nothing
-        return self._map(target.at(time_s))
+        return self._project_km(target.at(time_s))
 
     @property
     def own_name(self) -> str:
-        """Return the name that other platforms give the ownship."""
+        """Name by which other platforms know the ownship."""
         return self._source.roster.own_name
 
-    def ownship_position_at(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return east and north of the ownship in km at some times."""
-        return self._map(self._source.own.at(time_s))
+    def own_east_north_km(self, time_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return east and north of the ownship in km at these times."""
+        return self._project_km(self._source.own.at(time_s))
 
-    def start_of(self, name: str) -> tuple[float, tuple[float, float]]:
-        """Return where an aircraft's nose points at its start, and where that is, km; the ownship's
-        of a name that is no target's.
-        """
+    def start_yaw_and_position(self, name: str) -> tuple[float, tuple[float, float]]:
+        """Return an aircraft's start: yaw (rad), east, north (km); the ownship's if unknown."""
         flight = self._targets.get(name)
         if flight is None:
             return self.start_yaw_rad, (0.0, 0.0)
-        state = flight.at(_times(flight, self.duration_s, 2)[:1])
-        east, north = self._map(state)
+        state = flight.at(_times_present(flight, self.duration_s, 2)[:1])
+        east, north = self._project_km(state)
         return float(state.yaw_rad[0]), (float(east[0]), float(north[0]))
 
     @property
     def tracks(self) -> dict[str, Track]:
-        """The tracks of all whom detections may be of, by name."""
+        """Flights of the targets that are drawn and of the ownship, by name."""
         own = {self._source.roster.own_name: self.own}
         return {**own, **{track.name: track for track in self.targets}}
 
-    def closest_s(self, name: str) -> float | None:
-        """Return when a target is closest, if it ever meets the ownship."""
+    def closest_approach_s(self, name: str) -> float | None:
+        """Return when a target is closest to the ownship, s; None if they never meet."""
         return self._closest_s.get(name)
 
-    def _track(self, target: Any, count: int) -> Track:
-        times = _times(target, self.duration_s, count)
+    def _make_track(self, target: Any, count: int) -> Track:
+        times = _times_present(target, self.duration_s, count)
         if target.name in self._closest_s:
             times = np.union1d(times, [self._closest_s[target.name]])
         state, own = target.at(times), self._source.own.at(times)
@@ -141,9 +139,9 @@ class Flights:
             own.lat_deg, own.lon_deg, own.alt_m, state.lat_deg, state.lon_deg, state.alt_m
         )
         range_m = np.where(own.present & state.present, range_m, np.nan)
-        return Track(target.name, times, *self._map(state), range_m, _altitude(state))
+        return Track(target.name, times, *self._project_km(state), range_m, _altitude_or_nan(state))
 
-    def _map(self, state: Any) -> tuple[FloatArray, FloatArray]:
+    def _project_km(self, state: Any) -> tuple[FloatArray, FloatArray]:
         north, east, _ = line_of_sight_ned(
             *self.origin, state.lat_deg, state.lon_deg, state.alt_m, validate=False
         )
@@ -151,20 +149,20 @@ class Flights:
         return np.where(there, east / 1000, np.nan), np.where(there, north / 1000, np.nan)
 
 
-def _altitude(state: Any) -> FloatArray:
+def _altitude_or_nan(state: Any) -> FloatArray:
     return np.where(state.present, state.alt_m, np.nan)
 
 
-def _nearest(targets: Sequence[Any], nearest_m: dict[str, float]) -> list[Any]:
-    """Return the targets that get a track, in their order."""
+def _targets_to_draw(targets: Sequence[Any], nearest_m: dict[str, float]) -> list[Any]:
+    """Return the targets to draw, in their order: all, or the `MOST_TRACKS` that come nearest."""
     if len(targets) <= MOST_TRACKS:
         return list(targets)
     range_m = np.array([nearest_m.get(target.name, math.inf) for target in targets])
     return [targets[i] for i in np.sort(np.argsort(range_m, kind="stable")[:MOST_TRACKS]).tolist()]
 
 
-def _times(flight: Any, duration_s: float, count: int) -> FloatArray:
-    """Return times over the part of a run in which an aircraft is there."""
+def _times_present(flight: Any, duration_s: float, count: int) -> FloatArray:
+    """Return `count` times, s, spread over the part of a run in which an aircraft is present."""
     start, end = flight.interval_present() if hasattr(flight, "interval_present") else (0, math.inf)
     start = min(max(0.0, start), duration_s)
     end = max(start, min(duration_s, end))
@@ -176,8 +174,10 @@ def _times(flight: Any, duration_s: float, count: int) -> FloatArray:
 Positions = dict[str, list[tuple[Track, FloatArray, FloatArray, FloatArray]]]
 
 
-def positions(flights: Flights, detected: Detected) -> Positions:
-    """Return for each sensor and target the true positions of its detections."""
+def detection_positions(flights: Flights, detected: Detected) -> Positions:
+    """Return for each sensor, target by target, its flight and time, true east and north (km) of
+    the detections to mark.
+    """
     tracks = flights.tracks
     wanted: dict[int, list[tuple[str, FloatArray]]] = {}
     grouped = {name: rows_by_target(detected.target[name]) for name in detected.sensors}
@@ -191,7 +191,7 @@ def positions(flights: Flights, detected: Detected) -> Positions:
     for target, parts in sorted(wanted.items()):
         # One call per target for all sensors together.
         times = np.concatenate([times for _, times in parts])
-        east, north = flights.position_at(detected.names[target], times)
+        east, north = flights.east_north_km(detected.names[target], times)
         start = 0
         for name, part in parts:
             here = slice(start, start + len(part))
@@ -202,7 +202,7 @@ def positions(flights: Flights, detected: Detected) -> Positions:
 
 
 def plot_extent_points(flights: Flights, result: Positions) -> FloatArray:
-    """Return the start, the detections and the ownship at their times, shape (points, 2)."""
+    """Return the points the plan must show: start, detections and ownship then; km, (points, 2)."""
     points = [np.zeros((1, 2))]
     own = flights.own
     for paths in result.values():

@@ -19,7 +19,8 @@ MAP_WIDTH_IN, _MAP_HEIGHTS_IN = 6.4, (3.8, 6.6)
 
 @dataclass
 class Outline:
-    """A field of view from above, with a range limit if closed: its corners (n, 2), east and north.
+    """A sensor's field of view seen from above: corners (n, 2) east and north in km if closed, else
+    the directions of its edges.
 
     One without a limit has the directions of its two edges from where it begins, `start_km`.
     """
@@ -45,7 +46,7 @@ def outline_of(
     if not closed:
         angle = angle[:0] if everywhere else angle[[0, -1]]
     radius_km = reach.range_max_m / 1000 if closed else 1.0
-    azimuth, elevation = axes.true_direction(angle, np.zeros(len(angle)))
+    azimuth, elevation = axes.true_direction_in_body(angle, np.zeros(len(angle)))
     bearing = yaw_rad + azimuth
     level_km = radius_km * np.cos(elevation) if closed else np.ones(len(angle))
     corners = np.column_stack((np.sin(bearing), np.cos(bearing))) * level_km[:, np.newaxis]
@@ -81,13 +82,13 @@ def draw_outline(
 
 
 def reach_text(reach: Any, axes: Any) -> str:
-    """Return a reach in words, round the boresight where that is not the nose."""
+    """Return a sensor's field of view and range limit in words, with a boresight off the nose."""
     if not reach.enabled:
         return "switched off"
     low, high = (math.degrees(angle) for angle in reach.azimuth_rad)
     field = f"±{high:.4g}°" if low == -high else f"{low:.4g}° to {high:.4g}°"
     azimuth, elevation = (
-        round(math.degrees(angle[0]), 6) for angle in axes.true_direction(*np.zeros((2, 1)))
+        round(math.degrees(angle[0]), 6) for angle in axes.true_direction_in_body(*np.zeros((2, 1)))
     )
     if azimuth or elevation:
         field += f"\nround {azimuth:.4g}°"
@@ -98,7 +99,7 @@ def reach_text(reach: Any, axes: Any) -> str:
 
 
 class MapView:
-    """What part of the map is seen, at one scale in both directions.
+    """The section of the map that is drawn, with one scale for both directions.
 
     It is everything that was flown; but if all detections lie in a small part of that, the
     surroundings of that part. Of fields of view as much is shown as does not dwarf the flights.

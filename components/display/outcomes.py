@@ -13,7 +13,7 @@ import numpy as np
 from components.display.summary import Columns, rows_by_name
 from components.messages.alerts import AlertLevels
 from components.messages.columns import ORIGIN, POSITION
-from components.messages.state_tracks import StateTracks, is_held
+from components.messages.state_tracks import StateTracks, is_confirmed_or_coasted
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates
 from components.metrics.true_states import TargetsInFrame
@@ -35,13 +35,13 @@ _MOST_AT_ONCE = 200_000
 
 
 def outcome_observers(simulation: Simulation) -> list[Observer]:
-    """Return running summaries for the kinds of blocks that a scene has."""
+    """Return summaries that follow a run, one for each of tracks, alerts and manoeuvres sent."""
     result: list[Observer] = []
-    if names := senders(simulation, StateTracks):
-        result.append(TrackSummary(names, _recorded_targets(simulation)))
-    if names := senders(simulation, AlertLevels):
-        result.append(AlertSummary(_sources(simulation, names)))
-    if names := senders(simulation, Manoeuvres):
+    if names := blocks_sending(simulation, StateTracks):
+        result.append(TrackSummary(names, _true_targets_factory(simulation)))
+    if names := blocks_sending(simulation, AlertLevels):
+        result.append(AlertSummary(_alert_sources(simulation, names)))
+    if names := blocks_sending(simulation, Manoeuvres):
         result.append(ManoeuvreSummary(names))
     return result
 
@@ -62,12 +62,12 @@ class TrackSummary:
 
     def update(self, table: str, columns: Columns) -> None:
         """Update the summary with rows of ``state_tracks``."""
-        confirmed = is_held(columns["track_status"])
+        confirmed = is_confirmed_or_coasted(columns["track_status"])
         for name, rows in rows_by_name(columns["block"]):
             self._entries[name].add(columns, rows[confirmed[rows]])
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``tracks``: tracker → counts, error and first instants.
+        """Return section ``tracks``: by tracker counts, rms position error and first instants.
 
         Where truth is recorded: ``false`` tracks have a range and are never within `NEAR_M` of a
         target, ``position_error_m`` is the rms distance of the others' states from the nearest
@@ -105,7 +105,7 @@ class AlertSummary:
                 spans.setdefault(whom, [float(of_pair[0]), 0.0])[1] = float(of_pair[-1])
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``alerts``: alerter → level → when, and of which targets.
+        """Return section ``alerts``: by alerter and level when it was on, and for which targets.
 
         ``first_s`` and ``last_s`` are the first and the last instant at which any target had that
         level, ``targets`` the same by target; what is far from all targets is `NO_TARGET`. The
@@ -114,13 +114,13 @@ class AlertSummary:
         return {
             "alerts_of": self._sources,
             "alerts": {
-                name: {str(level): _spans(levels[level]) for level in sorted(levels)}
+                name: {str(level): _span_with_targets(levels[level]) for level in sorted(levels)}
                 for name, levels in self._entries.items()
             },
         }
 
 
-def _spans(of_target: dict[str, list[float]]) -> dict[str, Any]:
+def _span_with_targets(of_target: dict[str, list[float]]) -> dict[str, Any]:
     firsts, lasts = zip(*of_target.values(), strict=True)
     return {
         "first_s": min(firsts),
@@ -161,15 +161,15 @@ class ManoeuvreSummary:
 _BY_BLOCK = ("sensors", "tracks", "late_looks", "alerts", "manoeuvres")
 
 
-def carried_blocks(simulation: Simulation) -> dict[str, str]:
-    """Return the platform of each block, the ownship's first; empty where there is only one."""
+def platform_by_block(simulation: Simulation) -> dict[str, str]:
+    """Return the platform's name by block, the ownship's blocks first; empty for one platform."""
     first = {name for one in simulation.components.values() for name in one.platforms()[:1]}
     carried = simulation.platforms.items()
     return dict(sorted(carried, key=lambda item: (item[1] not in first, item[1], item[0])))
 
 
 class PlatformSummary:
-    """Says what each of several platforms carries, and its closest approaches as all flew."""
+    """Lists what each of several platforms carries, and its closest approaches in the flown run."""
 
     tables: ClassVar[frozenset[str]] = frozenset()
 
@@ -180,8 +180,9 @@ class PlatformSummary:
         """Ignore all rows: this summary uses none."""
 
     def result(self) -> dict[str, Any]:
-        """Return the section ``platforms``: name → ``blocks``, and of all but the ownship
-        ``targets``, as the section of that name has them of the ownship."""
+        """Return the section ``platforms``: by name its ``blocks``, and for all but the ownship its
+        closest approaches in ``targets``.
+        """
         blocks: dict[str, list[str]] = {}
         for block, platform in sorted(self._simulation.platforms.items()):
             blocks.setdefault(platform, []).append(block)
@@ -194,12 +195,12 @@ class PlatformSummary:
     def _targets(self, platform: str) -> dict[str, Any]:
         for source in self._simulation.components.values():
             if isinstance(source, TrafficSource) and platform in source.platforms()[1:]:
-                return {"targets": source.approaches(platform)}
+                return {"targets": source.closest_approaches(platform)}
         return {}
 
 
 def select_platform(summary: Mapping[str, Any], platform: str) -> dict[str, Any]:
-    """Return the sections of a summary that are of one platform: its blocks and approaches."""
+    """Return only the parts of a summary on one platform's blocks and closest approaches."""
     carried = summary["platforms"][platform]
     blocks = set(carried["blocks"])
     result: dict[str, Any] = {"targets": carried.get("targets", summary.get("targets"))}
@@ -212,7 +213,7 @@ def select_platform(summary: Mapping[str, Any], platform: str) -> dict[str, Any]
 
 
 class _Tracker:
-    """What is kept of one tracker."""
+    """Running counts, errors and first instants of one tracker's confirmed tracks."""
 
     def __init__(self, targets: Any) -> None:
         self._at, self._targets = targets, None
@@ -227,7 +228,7 @@ class _Tracker:
     def add(self, columns: Columns, rows: IntArray) -> None:
         number = columns["track"]
         self._confirmed.update(np.unique(number[rows]).tolist())
-        self._first = _first_of_both(self._first, columns, rows)
+        self._first = _earliest_time_and_range(self._first, columns, rows)
         if self._at is None:
             return
         rows = rows[columns["has_range"][rows]]
@@ -236,11 +237,13 @@ class _Tracker:
             self._targets = self._at(tuple(float(columns[n][rows[0]]) for n in ORIGIN))
         step = _MOST_AT_ONCE // max(1, len(self._targets.names) if self._targets else 1) + 1
         for start in range(0, len(rows), step):
-            self._compare(columns, rows[start : start + step])
+            self._compare_with_truth(columns, rows[start : start + step])
 
-    def _compare(self, columns: Columns, rows: IntArray) -> None:
+    def _compare_with_truth(self, columns: Columns, rows: IntArray) -> None:
         assert self._targets is not None
-        apart = distances(columns, rows, self._targets.positions_at(columns["state_s"][rows]))
+        apart = distances_to_targets(
+            columns, rows, self._targets.positions_at(columns["state_s"][rows])
+        )
         # What is not there is no distance away; a scene may have no targets at all.
         nearest = np.fmin.reduce(apart, axis=0, initial=np.inf)
         near = nearest < NEAR_M
@@ -248,7 +251,9 @@ class _Tracker:
         closest = np.nanargmin(apart[:, near], axis=0) if near.any() else np.empty(0, np.int64)
         for target in np.unique(closest).tolist():
             name = self._targets.names[target]
-            first = _first_of_both(self._firsts.get(name), columns, rows[near][closest == target])
+            first = _earliest_time_and_range(
+                self._firsts.get(name), columns, rows[near][closest == target]
+            )
             assert first is not None
             self._firsts[name] = first
         self._squares_m2 += float((nearest[near] ** 2).sum())
@@ -266,10 +271,12 @@ class _Tracker:
         return result
 
 
-def _first_of_both(
+def _earliest_time_and_range(
     first: tuple[float, float] | None, columns: Columns, rows: IntArray
 ) -> tuple[float, float] | None:
-    """Return time and estimated range of the first of rows and what was before, then nearest."""
+    """Return time and estimated range of the earliest among these rows and a former result; at
+    equal times the nearest.
+    """
     if not len(rows):
         return first
     rows = rows[columns["time_s"][rows] == columns["time_s"][rows].min()]
@@ -283,8 +290,8 @@ def _first_result(first: tuple[float, float]) -> dict[str, float | None]:
     return {"time_s": first[0], "range_m": first[1] if math.isfinite(first[1]) else None}
 
 
-def _recorded_targets(simulation: Simulation) -> Any:
-    """Return what makes `TargetsInFrame` of a tracker's and an origin, where truth is recorded."""
+def _true_targets_factory(simulation: Simulation) -> Any:
+    """Return a function from tracker and origin to true targets in that frame; None if no truth."""
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     if not sources or not all(source.says_truth for source in sources):
         return None
@@ -292,7 +299,7 @@ def _recorded_targets(simulation: Simulation) -> Any:
 
 
 def flights_seen_from(simulation: Simulation, block: str) -> list[Any]:
-    """Return the flights, as known now, of all that a block's platform may see."""
+    """Return the true flights of all aircraft other than the platform that carries a block."""
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     platform = simulation.components[block].context.platform
     return [
@@ -302,15 +309,17 @@ def flights_seen_from(simulation: Simulation, block: str) -> list[Any]:
     ]
 
 
-def distances(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
-    """Return how far rows of tracks are from targets (targets, 3, rows) at the same times, m."""
+def distances_to_targets(columns: Columns, rows: Any, ned_m: FloatArray) -> FloatArray:
+    """Return the distances, m (targets, rows), of track rows from target positions (targets, 3,
+    rows) at the same times.
+    """
     estimate = np.stack([columns[name][rows] for name in POSITION])
     return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
 
 
-def _sources(simulation: Simulation, names: Iterable[str]) -> dict[str, list[str]]:
-    """Return which blocks tell each of some blocks of targets; `TRUTH` where only traffic does."""
-    traffic = set(senders(simulation, TrafficStates))
+def _alert_sources(simulation: Simulation, names: Iterable[str]) -> dict[str, list[str]]:
+    """Return each alerter's blocks that tell it of targets, or `TRUTH` if only traffic feeds it."""
+    traffic = set(blocks_sending(simulation, TrafficStates))
     result = {}
     for name in names:
         of = sorted({wire.source for wire in simulation.scene.wires if wire.target == name})
@@ -318,8 +327,8 @@ def _sources(simulation: Simulation, names: Iterable[str]) -> dict[str, list[str
     return result
 
 
-def senders(simulation: Simulation, message: type) -> list[str]:
-    """Return the names of all blocks that send a kind of message, sorted."""
+def blocks_sending(simulation: Simulation, message: type) -> list[str]:
+    """Return the sorted names of all blocks that send this class of message."""
     return sorted(
         name
         for name, component in simulation.components.items()

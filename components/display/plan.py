@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from components.display.alerted import Alerted, draw_alerted_lines, draw_manoeuvres
-from components.display.flights import Flights, Positions, Track, positions
+from components.display.flights import Flights, Positions, Track, detection_positions
 from components.display.map_view import (
     MAP_WIDTH_IN,
     MapView,
@@ -16,7 +16,7 @@ from components.display.map_view import (
     outline_of,
     reach_text,
 )
-from components.display.outcomes import carried_blocks
+from components.display.outcomes import platform_by_block
 from components.display.recorded_rows import Detected
 from components.display.symbols import (
     DENSE,
@@ -29,11 +29,11 @@ from components.display.symbols import (
     alternate_marks,
     draw_lines,
     draw_marks,
-    mark_of,
-    name_lines,
+    label_line_ends,
     platform_colours,
+    plot_arguments_of_mark,
     set_time_axis,
-    targets_key,
+    targets_legend_entry,
 )
 from components.display.terminal import distance_text
 from components.messages.reach import Reach
@@ -61,8 +61,8 @@ def draw_plan(
     summary: dict[str, Any],
     alerted: Alerted,
 ) -> Path:
-    """Draw the plan view, with fields of view as the blocks have them, and write it as PNG."""
-    marks, carrying = positions(flights, detected), carried_blocks(simulation)
+    """Draw flights, fields of view and detections from above, and altitudes over time, as PNG."""
+    marks, carrying = detection_positions(flights, detected), platform_by_block(simulation)
     looks = {
         name: getattr(simulation.components.get(name), "stated_reach", None)
         for name in detected.sensors
@@ -73,7 +73,9 @@ def draw_plan(
         name: outline_of(yaw_rad, reach, mounted[name], start_km)
         for name, reach in reaches.items()
         if reach.enabled
-        for yaw_rad, start_km in [flights.start_of(simulation.components[name].context.platform)]
+        for yaw_rad, start_km in [
+            flights.start_yaw_and_position(simulation.components[name].context.platform)
+        ]
     }
     view = MapView(flights, marks, list(outlines.values()))
     width_in = _LEFT_IN + MAP_WIDTH_IN + _LEGEND_IN
@@ -95,9 +97,9 @@ def draw_plan(
         above = {name: (t.time_s, t.east_km, t.north_km) for name, t in tracks.items()}
         draw_alerted_lines(axes, alerted, above)
         for name, when_s in alerted.manoeuvres.items():
-            draw_manoeuvres(axes, *flights.position_at(name or flights.own_name, when_s))
+            draw_manoeuvres(axes, *flights.east_north_km(name or flights.own_name, when_s))
         drawn = {
-            name: _draw_marks(axes, view, marks[name], detected.styles, name)
+            name: _draw_detection_marks(axes, view, marks[name], detected.styles, name)
             for name in detected.sensors
         }
         colours = platform_colours(carrying.values())
@@ -123,7 +125,7 @@ def draw_plan(
         texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
         dense = len(flights.targets) >= DENSE
         handles = _legend(texts, detected, drawn, summary, carrying, dense)
-        handles[4:4] = alerted.key()
+        handles[4:4] = alerted.legend_entries()
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(right + 0.005, bottom + high),
             frameon=False, labelspacing=0.9, borderaxespad=0.0,
@@ -158,7 +160,7 @@ def _draw_tracks(axes: Any, view: MapView, flights: Flights) -> None:
 
 
 def _arrow_head(line: FloatArray, length_km: float) -> FloatArray | None:
-    """Return the three points of an arrow head at a track's end; None if it hardly moves."""
+    """Return an arrow head's three points at a flight's end; None if the flight is shorter."""
     if not len(line):
         return None
     back = np.flatnonzero(np.hypot(*(line - line[-1:]).T) > length_km)
@@ -170,14 +172,14 @@ def _arrow_head(line: FloatArray, length_km: float) -> FloatArray | None:
     return np.array([line[-1] - along + across, line[-1], line[-1] - along - across])
 
 
-def _draw_marks(
+def _draw_detection_marks(
     axes: Any,
     view: MapView,
     paths: list[tuple[Track, FloatArray, FloatArray, FloatArray]],
     styles: Mapping[str, Mark],
     name: str,
 ) -> int:
-    """Mark a sensor's detections, as far as they can be told apart, and return how many."""
+    """Draw a sensor's detections, thinned so that marks do not overlap; return how many."""
     if not paths:
         return 0
     points = []
@@ -194,7 +196,7 @@ def _draw_altitudes(
     styles: Mapping[str, Mark],
     px_per_s: float,
 ) -> None:
-    """Draw altitude above the ellipsoid over time, and where each sensor detected what."""
+    """Draw altitude above the ellipsoid over time, with marks where sensors detected targets."""
     tracks = [*flights.targets, flights.own]
     lines = {track.name: np.column_stack((track.time_s, track.alt_m)) for track in tracks}
     every = np.concatenate([track.alt_m for track in tracks])
@@ -206,7 +208,7 @@ def _draw_altitudes(
     *others, own = lines.values()
     draw_lines(axes, others, own)
     if len(tracks) <= MOST_NAMED:
-        name_lines(axes, lines, "#333333")
+        label_line_ends(axes, lines, "#333333")
     for name, style in styles.items():
         points = []
         for track, time_s, _, _ in marks.get(name, []):
@@ -229,11 +231,11 @@ def _draw_closest(axes: Any, view: MapView, flights: Flights, colours: Mapping[s
     labels = Labels(axes, view.x, view.y, view.km_per_px, obstacles)
     own_colour = colours.get(flights.own_name, OWN)
     labels.add("ownship", 0.0, 0.0, colour=own_colour, weight="bold")
-    met = _nearest_first(flights)
+    met = _closest_approaches(flights)
     if met:
         there = np.array([[east, north] for _, _, _, east, north in met])
         own = np.column_stack(
-            flights.ownship_position_at(np.array([time_s for _, _, time_s, _, _ in met]))
+            flights.own_east_north_km(np.array([time_s for _, _, time_s, _, _ in met]))
         )
         axes.add_collection(
             LineCollection(list(np.stack((own, there), axis=1)), colors="#333333", linewidths=0.7,
@@ -243,7 +245,7 @@ def _draw_closest(axes: Any, view: MapView, flights: Flights, colours: Mapping[s
             there[:, 0], there[:, 1], linestyle="none", marker="x", markersize=7, color="#000000",
             markeredgewidth=1.3, zorder=3.1, scalex=False, scaley=False,
         )  # fmt: skip
-    others = [t.name for t in flights.targets if flights.closest_s(t.name) is None]
+    others = [t.name for t in flights.targets if flights.closest_approach_s(t.name) is None]
     named = set([*(name for _, name, *_ in met), *others][:MOST_NAMED])
     for track in flights.targets:
         seen = np.flatnonzero(np.isfinite(track.east_km))
@@ -262,11 +264,11 @@ def _draw_closest(axes: Any, view: MapView, flights: Flights, colours: Mapping[s
     return len(named)
 
 
-def _nearest_first(flights: Flights) -> list[tuple[float, str, float, float, float]]:
-    """Return range, target, time, east and north of the nearest closest approaches."""
+def _closest_approaches(flights: Flights) -> list[tuple[float, str, float, float, float]]:
+    """Return range (m), target, time (s), east, north (km) of the nearest approaches, ascending."""
     met = []
     for track in flights.targets:
-        time_s = flights.closest_s(track.name)
+        time_s = flights.closest_approach_s(track.name)
         at = len(track.time_s) if time_s is None else int(np.searchsorted(track.time_s, time_s))
         if time_s is not None and at < len(track.time_s) and np.isfinite(track.range_m[at]):
             east, north = float(track.east_km[at]), float(track.north_km[at])
@@ -282,7 +284,7 @@ def _legend(
 
     handles = [
         Line2D([], [], color=OWN, linewidth=2.0, label="ownship"),
-        targets_key(dense),
+        targets_legend_entry(dense),
         Line2D([], [], linestyle="none", marker="o", markersize=5, color="#333333", label="start"),
         Line2D([], [], linestyle=":", marker="x", linewidth=0.7, color="#000000",
                label="closest approach"),
@@ -300,5 +302,5 @@ def _legend(
             text += f"\n({drawn[name]:,} of them marked)"
         if name in reaches:
             text += f"\n{reaches[name]}"
-        handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=text))
+        handles.append(Line2D([], [], **plot_arguments_of_mark(detected.styles[name]), label=text))
     return handles

@@ -31,7 +31,7 @@ _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 def iterate_row_groups(
     path: Path, columns: Sequence[str], most: float = math.inf
 ) -> Iterator[dict[str, Any]]:
-    """Yield columns of each row group that has rows, in order; nothing for a missing table.
+    """Yield wanted columns by row group of a Parquet table by name; nothing if it is missing.
 
     They are arrays, texts a `Text`. Of a table of more rows than `most`, groups spread over it.
     """
@@ -45,11 +45,11 @@ def iterate_row_groups(
         for number in range(0, file.num_row_groups, step):
             table = file.read_row_group(number, columns=list(columns))
             if table.num_rows:
-                yield {name: _array(table[name], name in TEXT) for name in columns}
+                yield {name: _column_to_array(table[name], name in TEXT) for name in columns}
 
 
 def row_count(path: Path) -> int:
-    """Return how many rows a table has; none where it is not there."""
+    """Return the number of rows of a Parquet table; 0 if the file is missing."""
     if not path.is_file():
         return 0
     import pyarrow.parquet as pq
@@ -57,7 +57,7 @@ def row_count(path: Path) -> int:
     return int(pq.read_metadata(path).num_rows)
 
 
-def _array(column: Any, text: bool) -> Any:
+def _column_to_array(column: Any, text: bool) -> Any:
     if not text:
         return column.combine_chunks().to_numpy(zero_copy_only=False)
     if column.num_chunks > 1:
@@ -67,15 +67,15 @@ def _array(column: Any, text: bool) -> Any:
     return Text(np.concatenate(codes).astype(np.int64), tuple(chunks[0].dictionary.to_pylist()))
 
 
-def read_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, tuple[str, ...]]]:
-    """Yield times, codes of combinations and their names for each row group of ``fused``."""
+def iterate_fused(folder: Path) -> Iterator[tuple[FloatArray, IntArray, tuple[str, ...]]]:
+    """Yield by row group of ``fused`` times (s), codes of sensor combinations and their names."""
     for rows in iterate_row_groups(folder / "fused.parquet", ("time_s", "sensors")):
         yield rows["time_s"], rows["sensors"].codes, rows["sensors"].names
 
 
 @dataclass
 class Detected:
-    """When each sensor detected which target, and how far away, in the order of its series.
+    """Times, true ranges and target indices of each sensor's detections, perhaps thinned.
 
     ``target`` is an index into the names of targets; ranges are true slant ranges.
     """
@@ -90,7 +90,7 @@ class Detected:
 
     @classmethod
     def read(cls, folder: Path, sensors: Sequence[str]) -> "Detected":
-        """Read the table ``detections`` of a run folder, if there is one."""
+        """Return by sensor a run folder's detections of true targets, thinned if very many."""
         known: dict[str, int] = {}
         series: dict[tuple[str, int], int] = {}
 
@@ -127,7 +127,7 @@ class Detected:
 def thin_rows(
     pieces: Callable[[], Iterable[tuple[Any, ...]]], most: int, columns: int
 ) -> tuple[IntArray, list[FloatArray]]:
-    """Return the rows that are kept of many series: their series and columns, in order.
+    """Return series number and columns of the rows kept when rows of many series are thinned.
 
     Pieces are read twice, first to count; each is the rows' series 0, 1, 2, ... and columns. Every
     series keeps its first row and every n-th from there on (`strides`), so a series with few rows
@@ -138,7 +138,7 @@ def thin_rows(
         counts = np.bincount(series, minlength=len(counts)) + np.pad(
             counts, (0, max(0, int(series.max(initial=-1)) + 1 - len(counts)))
         )
-    every, before = strides(counts, most), np.zeros_like(counts)
+    every, before = row_strides(counts, most), np.zeros_like(counts)
     result: list[list[Any]] = [[np.empty(0, np.int64)], *([np.empty(0)] for _ in range(columns))]
     for series, *values in pieces():
         kept = (before[series] + index_in_groups(series)) % every[series] == 0
@@ -149,8 +149,8 @@ def thin_rows(
     return series, values
 
 
-def strides(counts: IntArray, most: int) -> IntArray:
-    """Return every how many rows of each series one is kept, a power of two.
+def row_strides(counts: IntArray, most: int) -> IntArray:
+    """Return n for each series, a power of two: only every n-th row of it is kept.
 
     Series of up to some length keep all their rows, longer ones at most that length, such that
     all together keep `most`, or one each. Where any count grows, no stride shrinks.
@@ -180,19 +180,19 @@ def index_in_groups(group: IntArray) -> IntArray:
 
 @dataclass
 class SensorScans:
-    """The times of a sensor's first `_FIRST_SCANS` scans, and the first of all with a detection."""
+    """Times of a sensor's first `_FIRST_SCANS` scans, and of its first scan with a detection."""
 
     first_s: FloatArray
     first_hit_s: float | None
 
     @property
     def period_s(self) -> float | None:
-        """Time from scan to scan; None for a single scan."""
+        """Usual time between scans, s; None for a single scan."""
         return scan_period_s(self.first_s)
 
 
 def scan_period_s(time_s: FloatArray) -> float | None:
-    """Return the time from scan to scan; None where all are at one time.
+    """Return the usual time between scans, s; None where all are at one time.
 
     It is the mean of the usual steps: a sensor that is out for a while scans no slower.
     """
@@ -205,17 +205,17 @@ def scan_period_s(time_s: FloatArray) -> float | None:
 
 @dataclass
 class ScansShown:
-    """Single scans of a sensor in a part of a run, and those that hit, also the last one before."""
+    """Times of scans in part of a run, of those with a detection, and of the last such before."""
 
     time_s: FloatArray
     hit_s: FloatArray
 
 
 def read_scans(folder: Path) -> dict[str, SensorScans]:
-    """Return count, times and first detection of scans by sensor, from a folder's ``scans``."""
+    """Return by sensor the times of first scans and of the first detection, from ``scans``."""
     result: dict[str, SensorScans] = {}
     for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
-        for name, (time_s, hit_s) in _times_by_sensor(rows).items():
+        for name, (time_s, hit_s) in _scan_and_hit_times(rows).items():
             scans = result.setdefault(name, SensorScans(time_s[:0], None))
             if len(scans.first_s) < _FIRST_SCANS:
                 scans.first_s = np.concatenate([scans.first_s, time_s])[:_FIRST_SCANS]
@@ -227,14 +227,16 @@ def read_scans(folder: Path) -> dict[str, SensorScans]:
 def scans_between(
     folder: Path, start_s: float, end_s: float, scans: Iterable[str]
 ) -> dict[str, ScansShown]:
-    """Return the scans of some sensors in [start_s, end_s]."""
+    """Return by sensor the times of scans in [start_s, end_s], and of those with a detection, with
+    the last one before.
+    """
     times: dict[str, list[FloatArray]] = {name: [] for name in scans}
     hits: dict[str, list[FloatArray]] = {name: [] for name in times}
     before: dict[str, FloatArray] = {}
     for rows in iterate_row_groups(folder / "scans.parquet", _SCANS):
         if float(rows["time_s"][0]) > end_s:
             break
-        for name, (time_s, hit_s) in _times_by_sensor(rows).items():
+        for name, (time_s, hit_s) in _scan_and_hit_times(rows).items():
             first, last = np.searchsorted(hit_s, start_s), np.searchsorted(hit_s, end_s, "right")
             before[name] = hit_s[:first][-1:] if first else before.get(name, hit_s[:0])
             hits[name].append(hit_s[first:last])
@@ -249,8 +251,8 @@ def scans_between(
     }
 
 
-def _times_by_sensor(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return for each sensor of a row group its times, and those of scans with a detection."""
+def _scan_and_hit_times(rows: Mapping[str, Any]) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return by sensor the times of a row group's scans, and of those with a detection."""
     return {
         name: (rows["time_s"][mine], rows["time_s"][mine[rows["detected"][mine] > 0]])
         for name, mine in rows_by_name(rows["block"])

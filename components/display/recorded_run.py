@@ -29,7 +29,7 @@ _LARGEST = 1e10
 
 @dataclass(frozen=True)
 class RecordedTables:
-    """A run's tables by name, as Arrow holds them; what they lack is a `UsageError`."""
+    """A run's recorded tables in Arrow by name; UsageError for a missing table or column."""
 
     folder: Path
     tables: Mapping[str, Any]
@@ -37,7 +37,7 @@ class RecordedTables:
 
     @cached_property
     def scene(self) -> dict[str, Any]:
-        """The scene that was run, nothing where there is no file; `UsageError` if it is no TOML."""
+        """The run's scene as parsed TOML; empty where the folder has no scene file."""
         path = self.folder / "scene.toml"
         try:
             return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -47,45 +47,48 @@ class RecordedTables:
             raise UsageError(f"{path}: is not TOML ({error})") from error
 
     def block_types(self, names: Iterable[str]) -> dict[str, str]:
-        """Return name → type of blocks as the scene says it, nothing of those it does not know."""
+        """Return each block's type by name, as the run's scene gives it; empty if not known."""
         blocks = self.scene.get("blocks", {})
         return {name: str(blocks.get(name, {}).get("type", "")) for name in names}
 
-    def has(self, table: str, *names: str) -> bool:
-        """Return whether a table is recorded and has columns."""
+    def has_columns(self, table: str, *names: str) -> bool:
+        """Return whether a table was recorded and has all columns with these names."""
         return table in self.tables and {*names} <= {*self.table(table).column_names}
 
     @cached_property
-    def carrying(self) -> dict[str, str]:
-        """Return the platform of each block, the ownship's first; empty where there is only one."""
+    def platform_by_block(self) -> dict[str, str]:
+        """Each block's platform (name), the ownship's blocks first; empty if none were recorded."""
         found = {
             (on, block)
             for name, table in self.tables.items()
-            if self.has(name, "block", "platform")
-            for block, on in _pairs(table)
+            if self.has_columns(name, "block", "platform")
+            for block, on in _block_platform_pairs(table)
             if on is not None
         }
         # Without truth it is by its usual name that the ownship is known.
-        in_order = sorted(found, key=lambda of: (of[0] in self._targets, of[0] != OWNSHIP, of))
+        in_order = sorted(
+            found, key=lambda of: (of[0] in self._true_target_names, of[0] != OWNSHIP, of)
+        )
         return {block: on for on, block in in_order}
 
     @cached_property
-    def _targets(self) -> set[str | None]:
-        return {*self.texts("truth", "target")} if self.has("truth", "target") else set()
+    def _true_target_names(self) -> set[str | None]:
+        return {*self.texts("truth", "target")} if self.has_columns("truth", "target") else set()
 
     @cached_property
     def own_name(self) -> str:
-        """Return the name that other platforms give the ownship, which is no true target."""
-        if not self.carrying:
+        """Name by which other platforms detect the ownship, one of no target in recorded truth."""
+        if not self.platform_by_block:
             return OWNSHIP
         seen = {name: None for table in ("detections", "tracks", "alerts")
-                if self.has(table, "target") for name in self.texts(table, "target")}  # fmt: skip
-        known = [name for name in (*self.carrying.values(), *seen) if name is not None]
-        return next((name for name in known if name not in self._targets), OWNSHIP)
+                if self.has_columns(table, "target") for name in self.texts(table,
+                "target")}  # fmt: skip
+        known = [name for name in (*self.platform_by_block.values(), *seen) if name is not None]
+        return next((name for name in known if name not in self._true_target_names), OWNSHIP)
 
     def seen_from(self, platform: str) -> "RecordedTables":
-        """Return what one of several platforms has: it is the ownship, which takes its place."""
-        names = list(dict.fromkeys(self.carrying.values()))
+        """Return the tables of the blocks on one platform, with that platform as the ownship."""
+        names = list(dict.fromkeys(self.platform_by_block.values()))
         if platform not in names:
             raise UsageError(
                 f"{self.folder}: --platform {platform!r}: nothing of this run is carried by it"
@@ -99,14 +102,14 @@ class RecordedTables:
         return replace(self, tables=tables, _kept={})
 
     @cached_property
-    def _join_pose(self) -> Any:
+    def _detections_with_pose(self) -> Any:
         return join_row_columns(self.tables, "detections")
 
     def table(self, name: str) -> Any:
-        """Return a table; detections have with them where the ownship was at each."""
-        return self._join_pose if name == "detections" else self.tables[name]
+        """Return a table by name; ``detections`` has the ownship's pose at each as more columns."""
+        return self._detections_with_pose if name == "detections" else self.tables[name]
 
-    def flights(self) -> dict[str, dict[str, FloatArray]]:
+    def true_flights(self) -> dict[str, dict[str, FloatArray]]:
         """Return the true flight of each aircraft by its name, the ownship first.
 
         The columns of `_STATE` in order of time; refused without truth, or if a target is called as
@@ -133,10 +136,8 @@ class RecordedTables:
         return result
 
     def true_poses(self, time_s: FloatArray, platform: str | None = None) -> FloatArray | None:
-        """Return the true poses (6, n) of a platform, by default the ownship; None where one of the
-        instants has none.
-        """
-        own = self.flights().get(platform or self.own_name)
+        """Return a platform's true poses (6, n), by default own; None if one is missing."""
+        own = self.true_flights().get(platform or self.own_name)
         if own is None:
             return None
         at = np.minimum(np.searchsorted(own["time_s"], time_s), len(own["time_s"]) - 1)
@@ -156,7 +157,7 @@ class RecordedTables:
                 )
 
     def numbers(self, table: str, name: str) -> FloatArray:
-        """Return a column as numbers, NaN where it is null; refuse one that is not numeric."""
+        """Return a column as float64, NaN where it is null; UsageError if it is not numeric."""
         try:
             column = self._column(table, name).to_numpy(zero_copy_only=False)
             return np.asarray(column, dtype=np.float64)
@@ -166,11 +167,11 @@ class RecordedTables:
     def stack_columns(
         self, table: str, names: Iterable[str], rows: IntArray | slice = slice(None)
     ) -> FloatArray:
-        """Return columns of numbers of some rows, (columns, rows)."""
+        """Return several numeric columns of the chosen rows as one array, (columns, rows)."""
         return np.stack([self.numbers(table, name)[rows] for name in names])
 
     def texts(self, table: str, name: str) -> list[str | None]:
-        """Return a column of texts, as `numbers` does one of numbers."""
+        """Return a column of texts as a list, None for null; UsageError for other contents."""
         if (table, name) not in self._kept:
             result = self._column(table, name).to_pylist()
             if not all(text is None or isinstance(text, str) for text in result):
@@ -182,7 +183,7 @@ class RecordedTables:
         return texts
 
     def values(self, table: str, name: str) -> AnyArray:
-        """Return a column of numbers or flags as an array of its own type; refuse any other."""
+        """Return a column of numbers or booleans in its own type; UsageError for other kinds."""
         result: AnyArray = self._column(table, name).to_numpy(zero_copy_only=False)
         if result.dtype.kind not in "biuf":
             return self.numbers(table, name)
@@ -195,14 +196,16 @@ class RecordedTables:
         return columns[name]
 
 
-def _pairs(table: Any) -> set[tuple[str, str | None]]:
-    """Return which blocks have rows in a table, each with what carries it."""
+def _block_platform_pairs(table: Any) -> set[tuple[str, str | None]]:
+    """Return the (block, platform) pairs that occur in a table."""
     rows = table.select(["block", "platform"]).group_by(["block", "platform"]).aggregate([])
     return {(row["block"], row["platform"]) for row in rows.to_pylist()}
 
 
 def _rows_on_platform(name: str, table: Any, platform: str, first: str) -> Any:
-    """Return a table's rows of blocks on a platform; of the truth all, as seen from it."""
+    """Return the rows of blocks on a platform; of the table ``truth`` all rows, with the platform's
+    name exchanged for the ownship's.
+    """
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -218,23 +221,25 @@ def _rows_on_platform(name: str, table: Any, platform: str, first: str) -> Any:
 
 
 def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
-    """Return the tables of a run: a folder's path, or what `dsa_des.run` returns."""
+    """Return a run's recorded tables, from a folder's path or the result of `dsa_des.run`."""
     if isinstance(run, Run):
         return RecordedTables(run.path or Path("the run"), run.tables)
     return read_tables(os.fspath(run))
 
 
-def suggest_scene(name: str) -> str:
-    """Return what to do where a shipped scene is named in the place of a run, or nothing."""
+def scene_hint(name: str) -> str:
+    """Return the end of an error message that helps a user who named a shipped scene instead of a
+    run; empty otherwise.
+    """
     scene = find_example(name, "scene")
     return f"; of the scene: dsa-des run {name}, then the folder it names" if scene else ""
 
 
 def read_tables(run: str) -> RecordedTables:
-    """Read all tables of a run's folder; `UsageError` where it is none or one cannot be read."""
+    """Return a run folder's tables; UsageError if it is none or a table cannot be read."""
     folder = Path(run)
     if not folder.is_dir():
-        raise UsageError(f"{run}: there is no such folder{suggest_scene(run)}")
+        raise UsageError(f"{run}: there is no such folder{scene_hint(run)}")
     paths = sorted(folder.glob("*.parquet"))
     if not (folder / "run.json").is_file() or not paths:
         raise UsageError(f"{run}: holds no run: run.json or its tables are missing")
@@ -242,7 +247,7 @@ def read_tables(run: str) -> RecordedTables:
 
 
 def read_table(path: Path) -> Any:
-    """Read a table of a run; `UsageError` where it cannot be read."""
+    """Return a Parquet file as an Arrow table; UsageError if it cannot be read."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 

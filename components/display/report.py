@@ -8,9 +8,9 @@ import numpy as np
 
 from components.display.outcomes import (
     PlatformSummary,
-    carried_blocks,
+    blocks_sending,
     outcome_observers,
-    senders,
+    platform_by_block,
 )
 from components.display.summary import FusedSummary, SensorSummary
 from components.messages.detections import Detections
@@ -19,8 +19,8 @@ from dsa_des.running.reports import Change, Difference
 from dsa_des.running.simulation import Simulation
 
 
-def share_that_differs(changes: Mapping[str, Any]) -> float:
-    """Return detections gained and lost, of what `compare_runs` returned, per one before."""
+def changed_detections_ratio(changes: Mapping[str, Any]) -> float:
+    """Return the number of detections gained and lost between runs, over the reference's number."""
     changed = changes.get("detections_gained", 0) + changes.get("detections_lost", 0)
     return float(changed / max(changes.get("detections_reference", 0), 1))
 
@@ -36,7 +36,7 @@ class DetectAndSenseReport:
         Change("fused", "fused_share", ".1%"),
     )
     difference = Difference(
-        "detections that differ", "share of detections gained or lost", share_that_differs
+        "detections that differ", "share of detections gained or lost", changed_detections_ratio
     )
 
     def observers(self, simulation: Simulation) -> list[Observer]:
@@ -50,17 +50,17 @@ class DetectAndSenseReport:
         return [SensorSummary(sensors, off), FusedSummary(), *outcome_observers(simulation), *each]
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
-        """Print a run's summary on a ``rich.console.Console``; sections that lack are left out."""
-        from components.display.terminal import show
+        """Print a run's summary on a ``rich.console.Console``, leaving out missing sections."""
+        from components.display.terminal import print_run_summary
 
-        show(console, summary)
+        print_run_summary(console, summary)
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
         """Return the differences between two runs' recorded tables."""
         return compare_runs(reference, other)
 
     def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
-        """Return which targets a sensor no longer sees at all."""
+        """Return a text on sensors and targets that are no longer detected; empty if none."""
         missed = changes.get("never_detected")
         return [f"never sees {', '.join(missed)}"] if missed else []
 
@@ -76,14 +76,14 @@ class DetectAndSenseReport:
         from components.display.flights import Flights
         from components.display.plan import draw_plan
         from components.display.recorded_rows import Detected
-        from components.display.symbols import styles_of
+        from components.display.symbols import sensor_marks
         from components.display.timeline import draw_timeline
         from components.display.tracks import DrawnTracks, draw_tracks
 
         flights = Flights.from_simulation(simulation, summary)
         detected = Detected.read(folder, sensor_names(simulation))
-        carrying = carried_blocks(simulation)
-        detected.styles = styles_of(detected.sensors, simulation.components, carrying)
+        carrying = platform_by_block(simulation)
+        detected.styles = sensor_marks(detected.sensors, simulation.components, carrying)
         alerted = Alerted.read(folder)
         paths = []
         if flights is not None:
@@ -101,11 +101,11 @@ class DetectAndSenseReport:
 
 def sensor_names(simulation: Simulation) -> list[str]:
     """Return the names of all blocks that send `Detections`, sorted."""
-    return senders(simulation, Detections)
+    return blocks_sending(simulation, Detections)
 
 
 def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the differences between two runs' tables.
+    """Return two runs' differences in detections and fusion, from tables, by the figure's name.
 
     Tables are ``pyarrow.Table`` by name: ``detections`` and ``fused``. ``detections_gained`` and
     ``detections_lost`` count (sensor, target, instant) that only one of the runs has, of
@@ -116,11 +116,11 @@ def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict
     only one run detects. ``fused_share`` is the share of fused rows with two sensors or more,
     ``fused_share_change`` its change. False alarms are left out.
     """
-    before, after = _detections(reference), _detections(other)
+    before, after = _times_and_true_ranges(reference), _times_and_true_ranges(other)
     common = before.keys() & after.keys()
     moved: tuple[float, float] | tuple[None, None] = (None, None)
     of = None
-    firsts, others = _first_by_sensor(before), _first_by_sensor(after)
+    firsts, others = _first_by_sensor_and_target(before), _first_by_sensor_and_target(after)
     for name in sorted(firsts.keys() & others.keys()):
         change = (others[name][1] - firsts[name][1], others[name][0] - firsts[name][0])
         if moved[0] is None or abs(change[0]) > abs(moved[0]):
@@ -140,8 +140,8 @@ def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict
     }
 
 
-def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float, float]]:
-    """Return time and true range by (sensor/target, tick)."""
+def _times_and_true_ranges(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float, float]]:
+    """Return time (s) and true range (m) of each detection, by sensor/target and tick."""
     table = tables.get("detections")
     if table is None:
         return {}
@@ -154,7 +154,7 @@ def _detections(tables: Mapping[str, Any]) -> dict[tuple[str, int], tuple[float,
     }
 
 
-def _first_by_sensor(
+def _first_by_sensor_and_target(
     detections: Mapping[tuple[str, int], tuple[float, float]],
 ) -> dict[str, tuple[float, float]]:
     result: dict[str, tuple[float, float]] = {}

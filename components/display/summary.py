@@ -81,7 +81,7 @@ class FusedSummary:
 
 
 class _Sensor:
-    """What is kept of one sensor."""
+    """Running counts, first and last detection of one sensor."""
 
     def __init__(self) -> None:
         self.scans = 0
@@ -108,9 +108,9 @@ class _Sensor:
         true = rows[columns["target"].codes[rows] >= 0]
         self.false_alarms += len(rows) - len(true)
         if len(true):
-            self._add_true(columns, true)
+            self._add_true_detections(columns, true)
 
-    def _add_true(self, columns: Columns, rows: IntArray) -> None:
+    def _add_true_detections(self, columns: Columns, rows: IntArray) -> None:
         self.detections += len(rows)
         tick = columns["tick"]
         if self.first is None or self.first.tick == tick[rows[0]]:
@@ -137,12 +137,14 @@ class _Sensor:
                 for name, n in self.skipped.items()
                 if n or name != _HIDDEN
             },
-            "first_detection": self._mark_censored(self.first, 0),
-            "last_detection": self._mark_censored(self.last, 1),
+            "first_detection": self._sighting_with_censoring(self.first, 0),
+            "last_detection": self._sighting_with_censoring(self.last, 1),
         }
 
-    def _mark_censored(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
-        """Return a sighting, and whether the sensor's first or last scan censors it."""
+    def _sighting_with_censoring(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
+        """Return a detection's fields, with ``at`` if it lies in the sensor's first or last scan,
+        so that the run cuts it off.
+        """
         if seen is None:
             return None
         result = seen.result()
@@ -152,7 +154,7 @@ class _Sensor:
 
 
 class _Sighting(NamedTuple):
-    """One detection."""
+    """Time, true range and target of one detection."""
 
     tick: int
     time_s: float
@@ -161,7 +163,7 @@ class _Sighting(NamedTuple):
 
     @classmethod
     def nearest(cls, columns: Columns, rows: IntArray) -> "_Sighting":
-        """Return the nearest of some rows of one instant."""
+        """Return the detection with the smallest true range among rows of one instant."""
         range_m = columns["true_range_m"][rows]
         # A block that knows no true range records NaN, which is never the nearest.
         row = rows[np.argmin(np.where(np.isnan(range_m), np.inf, range_m))]
@@ -185,7 +187,7 @@ def _select_nearer(one: _Sighting | None, other: _Sighting) -> _Sighting:
 
 
 def rows_by_name(column: Any) -> list[tuple[str, IntArray]]:
-    """Return each name that occurs in a text column and its rows, ascending."""
+    """Return each name in a text column with its row indices, in the dictionary's order."""
     counts = np.bincount(column.codes + 1)[1:]  # code -1 is null
     return [
         (column.names[code], np.flatnonzero(column.codes == code))

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.sensor.marks import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
+from components.sensor.palette import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.mark import Mark, distinguish_marks, marks_of
 from dsa_des.record.drawing import figure_text
@@ -44,37 +44,37 @@ _NAME_PT = FONT_SIZE - 1
 Box = tuple[float, float, float, float]
 
 
-def styles_of(
+def sensor_marks(
     names: Iterable[str], blocks: Mapping[str, Any], carrying: Mapping[str, str] | None = None
 ) -> dict[str, Mark]:
-    """Return name → mark of sensors by the classes of a run's blocks, alike in every figure.
+    """Return marker, size and colour of each sensor by name, the same in every figure of a run.
 
     Where several platforms are `carrying` blocks, the colour is that of the platform.
     """
     classes = {name: type(blocks[name]) if name in blocks else None for name in names}
     carrying = carrying or {}
-    return in_colours(marks_of(classes), carrying, platform_colours(carrying.values()))
+    return recolour_by_platform(marks_of(classes), carrying, platform_colours(carrying.values()))
 
 
 def platform_colours(platforms: Iterable[str]) -> dict[str, str]:
-    """Return the colour of each of several platforms, in their order; nothing of one alone."""
+    """Return a colour for each platform by name; empty for a single platform."""
     names = list(dict.fromkeys(platforms))
     colours = {name: _PLATFORMS[k % len(_PLATFORMS)] for k, name in enumerate(names)}
     return colours if len(names) > 1 else {}
 
 
-def in_colours(
+def recolour_by_platform(
     marks: Mapping[str, Mark], carrying: Mapping[str, str], colours: Mapping[str, str]
 ) -> dict[str, Mark]:
-    """Return marks of blocks in the colours of what is `carrying` them, as far as there are any."""
+    """Return the marks with the colour of each block's platform, where there is one."""
     return {
         name: replace(mark, colour=colours.get(carrying.get(name, ""), mark.colour))
         for name, mark in marks.items()
     }
 
 
-def mark_of(style: Mark) -> dict[str, Any]:
-    """Return how a sensor's detections are marked: big ones open, small ones filled."""
+def plot_arguments_of_mark(style: Mark) -> dict[str, Any]:
+    """Return a mark as keywords of Matplotlib's plot: large markers open, small ones filled."""
     big = style.size_pt > 7
     return {
         "linestyle": "none",
@@ -87,7 +87,7 @@ def mark_of(style: Mark) -> dict[str, Any]:
 
 
 def block_marks(types: Mapping[str, str]) -> dict[str, Mark]:
-    """Return name → mark of blocks by their types, also those of one kind apart.
+    """Return each block's marker, size, colour by name, from its type; blocks of a kind differ.
 
     Markers are those of figures. Lines of sight and scans have none: colours differ too, in shades
     of that of the kind.
@@ -143,30 +143,32 @@ def spread_indices(count: int, most: int) -> IntArray:
 def alternate_marks(
     along_px: FloatArray, styles: Mapping[str, Mark], name: str, shift: float = 0.0
 ) -> IntArray:
-    """Return the indices of the marks of a sensor whose turn it is among all on a path."""
+    """Return indices along a path at which this sensor is marked, so that sensors take turns."""
     phase = list(styles).index(name) / len(styles) + shift
     return stagger_marks(along_px, _SPACING_PX * len(styles), phase)
 
 
 def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
-    """Mark a sensor's detections (n, 2) on axes of given limits, and return how many."""
+    """Draw a sensor's detections (n, 2), thinned if there are many, without changing the axes'
+    limits, and return how many were drawn.
+    """
     few = points[spread_indices(len(points), _MOST_MARKS)]
     axes.plot(
-        few[:, 0], few[:, 1], **mark_of(style), zorder=2.0 + 1.0 / style.size_pt,
+        few[:, 0], few[:, 1], **plot_arguments_of_mark(style), zorder=2.0 + 1.0 / style.size_pt,
         scalex=False, scaley=False,
     )  # fmt: skip
     return len(few)
 
 
 def rows_by_target(target: IntArray) -> list[tuple[int, IntArray]]:
-    """Return each target that occurs and its rows, ascending."""
+    """Return each target number that occurs, ascending, with the indices of its rows."""
     order = np.argsort(target, kind="stable")
     starts = np.flatnonzero(np.diff(target[order], prepend=-1))
     return [(int(target[rows[0]]), rows) for rows in np.split(order, starts[1:]) if len(rows)]
 
 
-def name_lines(axes: Any, lines: Mapping[str, FloatArray], colour: str) -> None:
-    """Write a name where each line (points, 2) last is within the axes, above one another."""
+def label_line_ends(axes: Any, lines: Mapping[str, FloatArray], colour: str) -> None:
+    """Write line names at their last points within the axes, shifted so as not to overlap."""
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
     ends = []
     for name, line in lines.items():
@@ -190,7 +192,7 @@ def name_lines(axes: Any, lines: Mapping[str, FloatArray], colour: str) -> None:
 
 
 def draw_lines(axes: Any, targets: Sequence[FloatArray], own: FloatArray | None = None) -> None:
-    """Draw lines (points, 2) of targets, of many their density, and that of the ownship."""
+    """Draw targets' lines (points, 2), or density if very many, and the thicker ownship line."""
     from matplotlib.collections import LineCollection
 
     if dense := len(targets) >= DENSE:
@@ -205,7 +207,7 @@ def draw_lines(axes: Any, targets: Sequence[FloatArray], own: FloatArray | None 
         axes.add_collection(drawn, autolim=False)
 
 
-def targets_key(dense: bool) -> Any:
+def targets_legend_entry(dense: bool) -> Any:
     """Return the entry of a legend for lines of targets."""
     from matplotlib.lines import Line2D
 
@@ -216,7 +218,7 @@ def targets_key(dense: bool) -> Any:
 
 
 def set_time_axis(axes: Any, start_s: float, end_s: float, what: str) -> None:
-    """Set an axis of time from start to end, a label for the other axis, and a grid."""
+    """Set the x axis to time in s from start to end, label the y axis, and draw a grid."""
     axes.set_xlim(start_s, max(end_s, start_s + 1e-9))
     axes.set(xlabel="time (s)", ylabel=what)
     add_grid(axes)
@@ -229,7 +231,7 @@ def add_grid(axes: Any) -> None:
 
 
 def draw_density(axes: Any, lines: Sequence[FloatArray]) -> None:
-    """Draw many lines (points, 2) as how many are in each cell of axes of given limits."""
+    """Draw how many lines (points, 2) cross each cell of the axes as a shade of grey."""
     from matplotlib.colors import LogNorm
 
     x, y = axes.get_xlim(), axes.get_ylim()
@@ -296,8 +298,8 @@ class Labels:
                 (px - width / 2, py - gap - height),
             ):
                 box = (left, bottom, left + width, bottom + height)
-                cost = sum(_overlap(box, other) for other in self._taken)
-                cost += 2 * (width * height - _overlap(box, (0.0, 0.0, right, top)))
+                cost = sum(_overlap_area(box, other) for other in self._taken)
+                cost += 2 * (width * height - _overlap_area(box, (0.0, 0.0, right, top)))
                 # A free place must not seem taken by the rounding of its corners.
                 cost = round(cost + self._covered_area(box), 6)
                 if best is None or cost < best[0]:
@@ -315,13 +317,13 @@ class Labels:
         )  # fmt: skip
 
     def _covered_area(self, box: Box) -> float:
-        """Return about the area of the obstacles that a box would cover."""
+        """Return roughly the area, square pixels, of obstacles that a box would cover."""
         x, y = self._obstacles.T
         inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
         return 0.5 * _CELL_PX**2 * int(np.count_nonzero(inside))
 
 
-def _overlap(one: Box, other: Box) -> float:
+def _overlap_area(one: Box, other: Box) -> float:
     """Return the area that two boxes share."""
     wide = min(one[2], other[2]) - max(one[0], other[0])
     high = min(one[3], other[3]) - max(one[1], other[1])

@@ -11,20 +11,20 @@ MOST_TARGETS = 10
 MOST_IN_A_LINE = 4
 
 
-def show(console: Any, summary: dict[str, Any]) -> None:
+def print_run_summary(console: Any, summary: dict[str, Any]) -> None:
     """Print a run's summary: sensors, fusion, closest approaches, outcomes, attitude, speed.
 
     The first four platform by platform, where there are several.
     """
     for platform in summary.get("platforms") or ():
         _print_line(console, f"On board of {platform}")
-        _show_chain(console, select_platform(summary, platform), platform)
+        _print_platform_results(console, select_platform(summary, platform), platform)
         console.print()
     if not summary.get("platforms"):
-        _show_chain(console, summary, "the ownship")
+        _print_platform_results(console, summary, "the ownship")
     for line in failure_sentences(summary.get("undone") or {}):
         _print_line(console, line)
-    for line in attitude_lines(summary.get("traffic") or {}):
+    for line in derived_attitude_lines(summary.get("traffic") or {}):
         _print_line(console, line)
     speed = speed_text(summary.get("simulated_s"), summary.get("cpu_s"))
     if speed:
@@ -33,8 +33,8 @@ def show(console: Any, summary: dict[str, Any]) -> None:
         _print_line(console, f"Results in {summary['out']}")
 
 
-def _show_chain(console: Any, summary: dict[str, Any], platform: str) -> None:
-    """Print what came of the blocks on a platform."""
+def _print_platform_results(console: Any, summary: dict[str, Any], platform: str) -> None:
+    """Print the results of one platform's blocks: sensors, fusion, closest approaches, outcomes."""
     if summary.get("sensors"):
         _print_table(
             console,
@@ -42,7 +42,9 @@ def _show_chain(console: Any, summary: dict[str, Any], platform: str) -> None:
             ("sensor", "scans>", "detections>", "", "time [s]>", "true range>", "target"),
             _sensor_rows(summary["sensors"]),
         )
-        for line in cut_off_lines(summary["sensors"]) + unseen_lines(summary["sensors"]):
+        for line in cut_off_detection_lines(
+            summary["sensors"]
+        ) + lines_on_sensors_without_detection(summary["sensors"]):
             _print_line(console, line)
         for key, said in (
             ("false_alarms", "False alarms (not counted above)"),
@@ -69,7 +71,7 @@ def _show_chain(console: Any, summary: dict[str, Any], platform: str) -> None:
 
 
 def distance_text(range_m: float | None) -> str:
-    """Return a distance for reading: metres below 1 km, otherwise km."""
+    """Return a distance as text, in m below 1 km and else in km; None is unknown."""
     if range_m is None:
         return "unknown"
     if round(range_m, 1) < 1000:
@@ -78,7 +80,7 @@ def distance_text(range_m: float | None) -> str:
 
 
 def speed_text(simulated_s: float | None, cpu_s: float | None) -> str:
-    """Return how fast the run was, as a sentence."""
+    """Return a sentence on simulated time per CPU time; empty where one of them is not known."""
     if simulated_s is None or cpu_s is None:
         return ""
     text = f"{simulated_s:.10g} s simulated in {cpu_s:.3g} s of CPU time"
@@ -113,8 +115,8 @@ _WHY_NOT_SEEN = {
 }
 
 
-def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
-    """Return a line on the asterisk beside detections that the run's begin or end cut off."""
+def cut_off_detection_lines(sensors: dict[str, Any]) -> list[str]:
+    """Return a line on the asterisk of detections cut off by the run's start or end, or nothing."""
     ends = {
         f"{which} at {seen['at']}"
         for entry in sensors.values()
@@ -124,8 +126,8 @@ def cut_off_lines(sensors: dict[str, Any]) -> list[str]:
     return [f"* cut off by the run: {', '.join(sorted(ends))}"] if ends else []
 
 
-def unseen_lines(sensors: dict[str, Any]) -> list[str]:
-    """Return a line for each sensor without a detection: why it saw nothing."""
+def lines_on_sensors_without_detection(sensors: dict[str, Any]) -> list[str]:
+    """Return a line per sensor that detected nothing, with each reason and how often it applied."""
     lines = []
     for name, entry in sensors.items():
         if entry["first_detection"] is not None:
@@ -150,7 +152,7 @@ def unseen_lines(sensors: dict[str, Any]) -> list[str]:
 
 
 def outcome_lines(summary: dict[str, Any]) -> list[str]:
-    """Return a line for each block with tracks, alerts or manoeuvres: their numbers."""
+    """Return lines on the results of each tracker, alerter and manoeuvring block."""
     lines = [f"{name}: {_tracks_text(entry)}" for name, entry in summary.get("tracks", {}).items()]
     lines += [
         f"{name}: {entry['left_out']:,} of {entry['looks']:,} looks of {sensor} "
@@ -189,13 +191,16 @@ def _tracks_text(entry: dict[str, Any]) -> str:
     if entry.get("position_error_m") is not None:
         text += f"; position error {distance_text(entry['position_error_m'])} rms"
     if not entry.get("targets"):
-        return f"{text}; first confirmed {_first_text(entry['first_confirmed'])}"
-    firsts = [f"{name} {_first_text(first)}" for name, first in _first_targets(entry["targets"])]
+        return f"{text}; first confirmed {_time_and_range_text(entry['first_confirmed'])}"
+    firsts = [
+        f"{name} {_time_and_range_text(first)}"
+        for name, first in _earliest_targets(entry["targets"])
+    ]
     text += f"; first within {NEAR_M:g} m of {', '.join(firsts)}"
     return text + _more_text(entry["targets"])
 
 
-def _first_text(first: dict[str, Any]) -> str:
+def _time_and_range_text(first: dict[str, Any]) -> str:
     away = "" if first["range_m"] is None else f" ({distance_text(first['range_m'])} away)"
     return f"at {first['time_s']:.1f} s{away}"
 
@@ -209,12 +214,12 @@ def _span_text(entry: dict[str, Any]) -> str:
 def _targets_text(targets: dict[str, dict[str, float]]) -> str:
     if len(targets) == 1:
         return next(iter(targets))
-    spans = [f"{name} {_span_text(entry)}" for name, entry in _first_targets(targets)]
+    spans = [f"{name} {_span_text(entry)}" for name, entry in _earliest_targets(targets)]
     return ", ".join(spans) + _more_text(targets)
 
 
-def _first_targets(targets: dict[str, Any]) -> list[tuple[str, Any]]:
-    """Return the first few targets, in order of time."""
+def _earliest_targets(targets: dict[str, Any]) -> list[tuple[str, Any]]:
+    """Return the few targets with the earliest time, in order of time."""
     return sorted(targets.items(), key=lambda item: next(iter(item[1].values())))[:MOST_IN_A_LINE]
 
 
@@ -223,8 +228,8 @@ def _more_text(targets: dict[str, Any]) -> str:
     return f" and {more:,} more target{'s' if more > 1 else ''}" if more > 0 else ""
 
 
-def attitude_lines(traffic: dict[str, Any]) -> list[str]:
-    """Return a line that attitude was derived from flown paths, and how wrong that is."""
+def derived_attitude_lines(traffic: dict[str, Any]) -> list[str]:
+    """Return a line on attitudes derived from flight paths, with their error; else empty."""
     derived = traffic.get("derived_attitude")
     if not derived:
         return []
@@ -242,7 +247,7 @@ def attitude_lines(traffic: dict[str, Any]) -> list[str]:
 
 
 def _sort_by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
-    """Return combinations with the fewest sensors first."""
+    """Return the sensor combinations with their counts, those of the fewest sensors first."""
     return sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0]))
 
 

@@ -14,7 +14,7 @@ from components.display.recorded_rows import (
     Detected,
     ScansShown,
     SensorScans,
-    read_fused,
+    iterate_fused,
     read_scans,
     scan_period_s,
     scans_between,
@@ -25,16 +25,16 @@ from components.display.symbols import (
     alternate_marks,
     draw_lines,
     draw_marks,
-    mark_of,
-    name_lines,
+    label_line_ends,
+    plot_arguments_of_mark,
     rows_by_target,
     set_time_axis,
-    targets_key,
+    targets_legend_entry,
 )
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import Mark
 from dsa_des.record.drawing import DPI, draw_to_png, figure_text
-from dsa_des.replicas.times_out import outage_times_of_seeds
+from dsa_des.replicas.outage_times import outage_times_of_seeds
 from dsa_des.running.simulation import Simulation
 
 Scans = dict[str, SensorScans]
@@ -48,7 +48,7 @@ _GOLDEN = 0.618  # keeps the marks of many targets from lining up
 
 @dataclass
 class CloseUp:
-    """A part of a run in which single scans are shown, why, and where sensors were fused."""
+    """The part of a run shown scan by scan, why it was chosen, and the instants of fusion in it."""
 
     start_s: float
     end_s: float
@@ -86,13 +86,13 @@ def draw_timeline(
         below.axvspan(close_up.start_s, close_up.end_s, color="#000000", alpha=0.12, linewidth=0)
         scene = simulation.scene
         out_s = outage_times_of_seeds(scene, [scene.seed], np.array([duration_s]))
-        bars = _draw_times_out(below, {n: s for n, (s,) in out_s.items()}, detected.styles)
+        bars = _draw_outages(below, {n: s for n, (s,) in out_s.items()}, detected.styles)
         below.set_title(f"Whole run (shaded: the part above{bars})", loc="left")
     return path
 
 
 def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
-    """Return a part of the run that shows how the sensors' clocks meet.
+    """Return the part shown scan by scan: at the first fusion, else first detection, else start.
 
     It lies around the first instant at which the most sensors were fused, else around the first
     detection, else at the start. It is four periods of the slowest sensor long, but has at most
@@ -113,13 +113,13 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
         what = f"Around the first fusion of {word} sensors"
     start_s = max(0.0, min(anchor_s - 0.3 * length_s, duration_s - length_s))
     end_s = start_s + length_s
-    return CloseUp(start_s, end_s, what, _combinations(folder, start_s, end_s))
+    return CloseUp(start_s, end_s, what, _fused_combinations(folder, start_s, end_s))
 
 
 def _find_first_combination(folder: Path, sensors: int) -> tuple[float, int] | None:
-    """Return the first instant of the largest combination, and its size; None if there is none."""
+    """Return the first time at which most sensors were fused, s, and how many; None if never."""
     best: tuple[float, int] | None = None
-    for time_s, code, names in read_fused(folder):
+    for time_s, code, names in iterate_fused(folder):
         size = np.array([name.count("+") + 1 for name in names])[code]
         largest = int(size.max())
         if largest > (1 if best is None else best[1]):
@@ -129,9 +129,11 @@ def _find_first_combination(folder: Path, sensors: int) -> tuple[float, int] | N
     return best
 
 
-def _combinations(folder: Path, start_s: float, end_s: float) -> list[tuple[float, list[str]]]:
+def _fused_combinations(
+    folder: Path, start_s: float, end_s: float
+) -> list[tuple[float, list[str]]]:
     result: set[tuple[float, str]] = set()
-    for time_s, code, names in read_fused(folder):
+    for time_s, code, names in iterate_fused(folder):
         low, high = np.searchsorted(time_s, [start_s, end_s])
         for row in range(int(low), int(high)):
             if "+" in names[code[row]]:
@@ -170,7 +172,7 @@ def _draw_scans(
             markersize=20, markeredgewidth=1.0, color=style.colour, clip_on=False,
         )  # fmt: skip
         hit_s = here.hit_s[here.hit_s >= close_up.start_s]
-        mark = mark_of(style) | {"markersize": size, "markerfacecolor": style.colour}
+        mark = plot_arguments_of_mark(style) | {"markersize": size, "markerfacecolor": style.colour}
         axes.plot(hit_s, np.full(len(hit_s), height[name]), **mark, zorder=3.0, clip_on=False)
     segments: list[Any] = []
     dots: list[tuple[float, float]] = []
@@ -211,8 +213,8 @@ def _draw_scans(
     )  # fmt: skip
 
 
-def _draw_times_out(axes: Any, out_s: Mapping[str, FloatArray], styles: Mapping[str, Mark]) -> str:
-    """Draw a bar at the foot wherever a sensor was out, and return what the title says of it."""
+def _draw_outages(axes: Any, out_s: Mapping[str, FloatArray], styles: Mapping[str, Mark]) -> str:
+    """Draw a bar at the bottom where a sensor was off or failed; return its words for the title."""
     out = [name for name in styles if len(out_s.get(name, ()))]
     for number, name in enumerate(out):
         from_s, to_s = out_s[name].T
@@ -254,20 +256,20 @@ def _draw_ranges(
     set_time_axis(axes, 0.0, duration_s, "true slant range (km)")
     if lines:
         draw_lines(axes, lines)
-        handles.append(targets_key(len(lines) >= DENSE))
+        handles.append(targets_legend_entry(len(lines) >= DENSE))
         if flights is not None and len(lines) <= MOST_NAMED:
             names = [target.name for target in flights.targets]
-            name_lines(axes, dict(zip(names, lines, strict=True)), "#333333")
+            label_line_ends(axes, dict(zip(names, lines, strict=True)), "#333333")
         if flights is not None:
             ranges = {t.name: (t.time_s, t.time_s, t.range_m / 1000) for t in flights.targets}
             draw_alerted_lines(axes, alerted, ranges)
     draw_manoeuvres(axes, alerted.manoeuvres_s, np.zeros(len(alerted.manoeuvres_s)))
-    handles += alerted.key()
+    handles += alerted.legend_entries()
     width_px = _SIZE_IN[0] * _BELOW * DPI
     for name in detected.sensors:
         _draw_detections(axes, detected, name, width_px / duration_s)
         label = figure_text(name, 16)
-        handles.append(Line2D([], [], **mark_of(detected.styles[name]), label=label))
+        handles.append(Line2D([], [], **plot_arguments_of_mark(detected.styles[name]), label=label))
     axes.legend(
         handles=handles, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=len(handles),
         frameon=False, borderaxespad=0.1, columnspacing=1.2, handletextpad=0.3,

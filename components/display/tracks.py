@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import NEAR_M, TABLE, distances, flights_seen_from
+from components.display.outcomes import NEAR_M, TABLE, distances_to_targets, flights_seen_from
 from components.display.recorded_rows import iterate_row_groups, row_count
 from components.display.symbols import DENSE, Labels, draw_density
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE, is_held
+from components.messages.state_tracks import COVARIANCE, is_confirmed_or_coasted
 from components.metrics.true_states import TargetsInFrame
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -48,7 +48,7 @@ _STILL_M = 10.0
 
 @dataclass(frozen=True, eq=False)
 class DrawnTrack:
-    """One track in order of time; it is false if it never comes near any target."""
+    """One track's rows in order of time; it counts as false if it is never near any target."""
 
     block: str
     number: int
@@ -59,7 +59,7 @@ class DrawnTrack:
 
 
 class Thinning:
-    """Chooses which rows of many to keep: all of short tracks, and long ones at random instants."""
+    """Chooses rows of tracks to keep: all of short tracks, at random instants of long ones."""
 
     def __init__(self, rows: int) -> None:
         self._each = np.uint64(max(1, math.ceil(rows / _KEPT_ROWS)))
@@ -79,7 +79,7 @@ class Thinning:
 
 
 class DrawnTracks:
-    """Tracks of a table, with the true flights in their frame."""
+    """Confirmed tracks of all trackers in a run, and the true flights in their frame."""
 
     def __init__(self, simulation: Simulation, columns: dict[str, Any]) -> None:
         self.origin = tuple(float(columns[name][0]) for name in ORIGIN)
@@ -102,7 +102,9 @@ class DrawnTracks:
             for number in np.unique(columns["track"][mine]).tolist():
                 rows = np.flatnonzero(mine & (columns["track"] == number))
                 one = {name: columns[name][rows] for name in columns}
-                near = distances(one, slice(None), self.seen_by[block].positions_at(one["state_s"]))
+                near = distances_to_targets(
+                    one, slice(None), self.seen_by[block].positions_at(one["state_s"])
+                )
                 # A comparison with nothing, as with what is not there, is false.
                 false = bool(len(targets)) and not bool((near < NEAR_M).any())
                 colour = _FALSE if false else COLOURS[turn % len(COLOURS)]
@@ -111,12 +113,14 @@ class DrawnTracks:
 
     @classmethod
     def read(cls, simulation: Simulation, folder: Path) -> "DrawnTracks | None":
-        """Read the tracks of a run's folder; None where none was confirmed."""
+        """Return a run's confirmed and coasted tracks with a range, thinned; None if none."""
         path, rows = folder / f"{TABLE}.parquet", []
         thinning = Thinning(min(row_count(path), _MOST_ROWS))
         for group in iterate_row_groups(path, _COLUMNS, _MOST_ROWS):
             group["block"] = np.array(group["block"].names, dtype=object)[group["block"].codes]
-            wanted = np.flatnonzero(is_held(group["track_status"]) & group["has_range"])
+            wanted = np.flatnonzero(
+                is_confirmed_or_coasted(group["track_status"]) & group["has_range"]
+            )
             kept = wanted[thinning(*(group[n][wanted] for n in ("tick", "block", "track")))]
             rows.append({n: group[n][kept] for n in _COLUMNS if n not in ("track_status", "tick")})
         if not any(len(part["block"]) for part in rows):
@@ -126,16 +130,16 @@ class DrawnTracks:
 
 
 def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
-    """Draw tracks with their 95 % ellipses on the plan and by height, and write the PNG."""
+    """Draw tracks with 95 % ellipses from above, and their heights over time, as PNG."""
     grid = np.linspace(*drawn.time_s, _MOST_POINTS)
     positions, own = drawn.targets.positions_at(grid), drawn.targets.position(drawn.own, grid)
     with draw_to_png(7.5, 8.4, path) as figure:
         plan, height = figure.subplots(2, 1, height_ratios=(3, 1))
-        _flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
+        _draw_flight(plan, height, grid, own, drawn.origin[2], {"color": _OWN, "linestyle": "--"})
         dense = len(positions) >= DENSE
         for position in positions:  # under a density their lines only make room
             style = {"color": _TRUTH, "alpha": 0.0 if dense else 1.0}
-            _flight(plan, height, grid, position, drawn.origin[2], style)
+            _draw_flight(plan, height, grid, position, drawn.origin[2], style)
             if np.nanmax(np.ptp(position, axis=1), initial=0.0) < _STILL_M:
                 plan.scatter(position[1, :1] / 1e3, position[0, :1] / 1e3, s=6, color=_TRUTH)
         spreads = len(drawn.tracks) <= MOST_SPREADS
@@ -151,10 +155,10 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
         plan.set_title(
             f"{many} confirmed track{'s' * (many != 1)} near targets, {false} false", loc="left"
         )
-        _legend(figure, drawn, false > 0, dense)
+        _draw_legend(figure, drawn, false > 0, dense)
         fit_axes_to_texts(figure)
         figure.subplots_adjust(top=0.93)
-        _names(figure, plan, drawn, positions, own)
+        _draw_names(figure, plan, drawn, positions, own)
         if dense:
             draw_density(plan, [ned_m[[1, 0]].T / 1e3 for ned_m in positions])
             above = drawn.origin[2] - positions[:, 2]
@@ -162,7 +166,7 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
     return path
 
 
-def _flight(
+def _draw_flight(
     plan: Any, height: Any, time_s: FloatArray, ned_m: FloatArray, alt_m: float, style: Any
 ) -> None:
     plan.plot(ned_m[1] / 1e3, ned_m[0] / 1e3, linewidth=0.7, zorder=1, **style)
@@ -200,7 +204,7 @@ def _draw_track(
         plan.plot(x, y, color=colour, linewidth=0.6, zorder=1)
 
 
-def _legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
+def _draw_legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
@@ -232,10 +236,10 @@ def _legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> None:
     figure.legend(handles=entries, loc="upper center", ncols=min(len(entries), 7), frameon=False)
 
 
-def _names(
+def _draw_names(
     figure: Any, plan: Any, drawn: DrawnTracks, positions: FloatArray, own: FloatArray
 ) -> None:
-    """Write names of aircraft at their ends and numbers of tracks at their beginnings."""
+    """Write aircraft names at the ends of flights and track numbers at their beginnings."""
     plan.apply_aspect()
     x, y = plan.get_xlim(), plan.get_ylim()
     plan.set(xlim=x, ylim=y)

@@ -30,7 +30,7 @@ def load_for_host(
     seed: int | None = None,
     platform: str | None = None,
 ) -> Scene:
-    """Return a scene, from a file or as it is, that has a traffic block; SceneError, UsageError.
+    """Return a host's scene, from a file or object; without traffic, it gets the host's block.
 
     Of several platforms' chains only that of the one that the host's ownship is.
     """
@@ -54,8 +54,8 @@ def _load_scene(
 
 
 def _select_platform(scene: Scene, platform: str) -> Scene:
-    """Return a scene with the blocks on one platform alone, for which it is the ownship."""
-    name = source_of(scene)
+    """Return a scene with only the blocks on this platform, which becomes the ownship."""
+    name = traffic_block_name(scene)
     block = scene.blocks[name]
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     names = block.cls(name, block.parameters, context).platforms()
@@ -97,8 +97,8 @@ _NEEDS_FLIGHTS: dict[str, bool | str] = {
 }  # fmt: skip
 
 
-def refuse_other_instants(scene: Scene) -> None:
-    """Raise SceneError for sensors that ask for flights between a host's calls, key by key."""
+def refuse_keys_needing_flights(scene: Scene) -> None:
+    """Raise SceneError for each sensor parameter that needs flights between a host's calls."""
     problems = [
         Problem(
             str(scene.path), f"blocks.{name}.{key}",
@@ -118,8 +118,10 @@ def _toml_value(value: bool | str) -> str:
     return repr(value) if isinstance(value, str) else str(value).lower()
 
 
-def source_of(scene: Scene) -> str:
-    """Return the name of the one block that sends traffic, for the host; SceneError if not one."""
+def traffic_block_name(scene: Scene) -> str:
+    """Return the name of the only block that sends traffic, in whose place a host steps; SceneError
+    if there is not exactly one.
+    """
     sources = [name for name, block in scene.blocks.items() if _is_traffic(block.cls)]
     if len(sources) != 1:
         what = (
@@ -133,17 +135,17 @@ def source_of(scene: Scene) -> str:
 
 
 def planes_in_scene(scene: Scene) -> list[Plane]:
-    """Return the planes that a scene made for a host lists itself."""
-    parameters: Any = scene.blocks[source_of(scene)].parameters
+    """Return the planes in a scene's host traffic block; empty if its traffic is another kind."""
+    parameters: Any = scene.blocks[traffic_block_name(scene)].parameters
     return list(parameters.planes) if isinstance(parameters, HostTrafficParameters) else []
 
 
-def with_host(scene: Scene, planes: Sequence[Plane]) -> Scene:
-    """Return the scene with these planes, moved by the host, for traffic.
+def with_host_traffic(scene: Scene, planes: Sequence[Plane]) -> Scene:
+    """Return the scene with its traffic replaced by these planes, which the host moves.
 
     The ticks stay those of the scene, so scans and draws are those of the whole run.
     """
-    name = source_of(scene)
+    name = traffic_block_name(scene)
     parameters = HostTrafficParameters(planes=list(planes))
     block = Block(name, HOST, HostTraffic, parameters)
     return replace(scene, blocks={**scene.blocks, name: block})

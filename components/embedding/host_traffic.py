@@ -21,8 +21,8 @@ class Plane(Aircraft):
     name: str = Field(min_length=1, description="Name; keys its random draws.")
 
     @model_validator(mode="after")
-    def _nobody_receives_it(self) -> Self:
-        Disagreements.refuse(
+    def _refuse_cooperative_keys(self) -> Self:
+        Disagreements.raise_if_any(
             [
                 f"{key} is given: cooperative sensors need to know where aircraft are between the "
                 "host's calls, so none can run in such a scene; leave it out"
@@ -40,7 +40,7 @@ class HostTrafficParameters(Parameters):
 
 
 class HostTraffic(Component):
-    """Stands where the host program gives positions; such a scene runs inside it only.
+    """Traffic whose positions a host program passes in; such a scene only runs inside a host.
 
     See `dsa_des.embed.Simulator`.
     """
@@ -63,7 +63,7 @@ class HostTraffic(Component):
         return self.roster
 
     def natural_duration_s(self) -> Fraction:
-        """Return a length for scenes that give none."""
+        """Return the duration, s, of scenes that give none: practically endless."""
         return _NO_END_S
 
     def setup(self) -> None:
@@ -77,5 +77,5 @@ class HostTraffic(Component):
 
     @property
     def width(self) -> int:
-        """Number of targets."""
+        """Number of targets, which is the number of planes."""
         return len(self.roster)

@@ -20,8 +20,8 @@ from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
 _CALL = "add_plane"
 
 
-def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
-    """Return a plane with a name, an aircraft type and further properties.
+def make_plane(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
+    """Return a checked plane with this name, from an aircraft type and keys that override it.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
     if isinstance(aircraft, str | Path):
         described = read_scene_file(find_input_file(aircraft))
         # A file may say how an obstacle stays in place: here the host says where it is.
-        _leave_out_flight(described.data)
+        _remove_flight_keys(described.data)
     elif isinstance(aircraft, Aircraft):
         fields = Aircraft.model_fields
         described.data = {key: getattr(aircraft, key) for key in fields}
@@ -63,7 +63,7 @@ def plane_of(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
         ) from error
 
 
-def _leave_out_flight(data: dict[str, Any]) -> None:
+def _remove_flight_keys(data: dict[str, Any]) -> None:
     from components.traffic.scripted import Flight
 
     for key in Flight.model_fields:
@@ -71,7 +71,7 @@ def _leave_out_flight(data: dict[str, Any]) -> None:
 
 
 class FixedPath:
-    """Where a plane is that the host does not move: one state, or one for each time.
+    """Positions and attitudes of a plane the host does not move: one, or one from each time on.
 
     Parameters
     ----------
@@ -89,7 +89,10 @@ class FixedPath:
     """
 
     def __init__(self, lla: ArrayLike, att: ArrayLike, times_s: ArrayLike | None) -> None:
-        position, attitude = _rows("position", lla), _rows("orientation", att)
+        position, attitude = (
+            _check_rows_of_three("position", lla),
+            _check_rows_of_three("orientation", att),
+        )
         count = max(len(position), len(attitude))
         for label, rows in (("position", position), ("orientation", attitude)):
             if len(rows) not in (1, count):
@@ -107,7 +110,7 @@ class FixedPath:
         )
 
     def at(self, time_s: float) -> FloatArray:
-        """Return lat, lon, alt, yaw, pitch, roll; before the first time the plane is absent."""
+        """Return lat, lon (rad), alt (m), yaw, pitch, roll (rad) at a time; NaN before any time."""
         row = int(np.searchsorted(self._times, time_s, side="right")) - 1
         if len(self._times) == 1:
             row = 0
@@ -115,7 +118,7 @@ class FixedPath:
         return state
 
 
-def _rows(label: str, value: ArrayLike) -> FloatArray:
+def _check_rows_of_three(label: str, value: ArrayLike) -> FloatArray:
     rows = np.atleast_2d(to_numbers(label, value))
     if rows.ndim != 2 or rows.shape[1] != 3:
         raise ValueError(f"{label} has the shape {np.shape(value)}: it must be (3,) or (times, 3)")
@@ -124,8 +127,8 @@ def _rows(label: str, value: ArrayLike) -> FloatArray:
     return rows
 
 
-def number_of(plane: str | int, names: tuple[str, ...]) -> int:
-    """Return the number of a plane by its name or its number; ValueError if there is none."""
+def plane_index(plane: str | int, names: tuple[str, ...]) -> int:
+    """Return the index of a plane, given its name or its index; ValueError if there is none."""
     if isinstance(plane, str):
         if plane not in names:
             raise ValueError(f"there is no plane {plane!r}{did_you_mean(plane, names)}")

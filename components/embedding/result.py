@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from components.messages.contributors import names_in
+from components.messages.contributors import sensor_names_in_mask
 from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.types import FloatArray
@@ -20,7 +20,7 @@ _MOST_LINES = 9
 
 @dataclass(frozen=True)
 class Sighting:
-    """One plane, or a false alarm, in one call.
+    """What one call found of one plane, or one false alarm.
 
     Parameters
     ----------
@@ -47,18 +47,18 @@ class Sighting:
 
     @property
     def detected(self) -> bool:
-        """Return whether any sensor detected it."""
+        """Return whether at least one sensor detected the plane in this call."""
         return bool(self.sensors)
 
     @property
     def polar(self) -> tuple[float, float, float]:
-        """Azimuth and elevation in rad and range in m, as the thesis's ``detected``."""
+        """Azimuth, elevation (rad), range (m) in own body axes; NaN where not measured."""
         return self.azimuth_rad, self.elevation_rad, self.range_m
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EncounterResult:
-    """What one call of `simulate` came to; sightings by plane name or position.
+    """Result of one call of `simulate`; indexing by plane name or position gives its sighting.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ class EncounterResult:
     messages: Mapping[str, Message]
 
     def __repr__(self) -> str:
-        lines = [_line(one) for one in (*self.sightings, *self.false_alarms)]
+        lines = [_sighting_text(one) for one in (*self.sightings, *self.false_alarms)]
         if len(lines) > _MOST_LINES:
             lines = [*lines[: _MOST_LINES - 1], f"... {len(lines) - _MOST_LINES + 1} more"]
         scans = ", ".join(f"{name} {number}" for name, number in self.scans.items()) or "none"
@@ -105,12 +105,12 @@ class EncounterResult:
 
     @cached_property
     def detected(self) -> FloatArray:
-        """Azimuth (rad), elevation (rad) and range (m) of each plane, shape (planes, 3)."""
+        """Azimuth, elevation (rad) and range (m) by plane, (planes, 3); NaN if not detected."""
         return np.array([sighting.polar for sighting in self.sightings]).reshape(-1, 3)
 
 
-def _line(one: Sighting) -> str:
-    """Return one sighting as a line."""
+def _sighting_text(one: Sighting) -> str:
+    """Return one line of text on a sighting: name, azimuth, elevation, range and sensors."""
     name = shorten(one.name) or "false alarm"
     if not one.detected:
         return f"{name}: not detected"
@@ -123,7 +123,7 @@ def _line(one: Sighting) -> str:
 def sightings_of(
     fused: FusedDetections | None, detections: Mapping[str, Detections]
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
-    """Return the detections by index in the roster, and the false alarms.
+    """Return sightings of detected planes by index in the roster, and the false alarms.
 
     From one row of each message of a call; `fused` is None when no sensor reported.
     """
@@ -143,7 +143,7 @@ def sightings_of(
         fused.contributors.tolist(),
         strict=True,
     ):
-        sensors = names_in(mask, fused.sensors)
+        sensors = sensor_names_in_mask(mask, fused.sensors)
         if target < 0:
             false.append(Sighting("", p, q, r, sensors))
             continue

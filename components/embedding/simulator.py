@@ -11,11 +11,11 @@ from components.aircraft.aircraft import Aircraft
 from components.embedding.host_scene import (
     load_for_host,
     planes_in_scene,
-    refuse_other_instants,
-    source_of,
-    with_host,
+    refuse_keys_needing_flights,
+    traffic_block_name,
+    with_host_traffic,
 )
-from components.embedding.planes import FixedPath, number_of, plane_of
+from components.embedding.planes import FixedPath, make_plane, plane_index
 from components.embedding.result import EncounterResult, Sighting, sightings_of
 from components.embedding.states import check_rows, traffic_states
 from components.messages.detections import Detections
@@ -68,17 +68,17 @@ class Simulator:
         platform: str | None = None,
     ) -> None:
         self.scene = load_for_host(scene, sets=sets, swaps=swaps, seed=seed, platform=platform)
-        self._source = source_of(self.scene)
-        refuse_other_instants(self.scene)
+        self._source = traffic_block_name(self.scene)
+        refuse_keys_needing_flights(self.scene)
         self._planes = planes_in_scene(self.scene)
         self._fixed: dict[int, FixedPath] = {}
         #: One chain for all planes, or one for each when the host calls plane by plane.
         self._chains: list[HostDriven] = []
         self._plane_by_plane = False
-        self._fusion = self._only_fusion()
+        self._fusion = self._find_only_fusion()
         self._wanted = None if beyond_fusion else [self._fusion]
         # Whatever the planes will be, this scene can be driven or it cannot.
-        self._clocks = self._chain()
+        self._clocks = self._new_chain()
 
     # -- before the first call -----------------------------------------------------------------
 
@@ -103,7 +103,7 @@ class Simulator:
         times_s: ArrayLike | None = None,
         **more: Any,
     ) -> str:
-        """Add a plane, before the first call of `simulate`; thesis ``addplane``.
+        """Add a plane before `simulate` is first called; return its name (thesis ``addplane``).
 
         Parameters
         ----------
@@ -150,7 +150,7 @@ class Simulator:
             "rcs_dbsm": rcs_dbsm, "swerling": swerling, "eo": eo, "ir": ir, "contrast": contrast,
             "contrast_ir": contrast_ir, **more,
         }  # fmt: skip
-        plane = plane_of(name, aircraft, values)
+        plane = make_plane(name, aircraft, values)
         if position is not None:
             self._fixed[len(self._planes)] = FixedPath(position, orientation, times_s)
         elif times_s is not None:
@@ -159,7 +159,7 @@ class Simulator:
         return name
 
     def start(self, *, plane_by_plane: bool = False) -> None:
-        """Build everything, so that the first call takes no longer than others.
+        """Build sensors and fusion now and run them once, so that the first call is not slow.
 
         The first call does so otherwise.
 
@@ -172,16 +172,16 @@ class Simulator:
             return
         self._plane_by_plane = plane_by_plane
         # A rehearsal on a chain of its own loads modules and fills tables; nothing remembers it.
-        self._rehearse(self._chain())
+        self._rehearse(self._new_chain())
         self._unseen = [Sighting(name) for name in self.planes]
         self._free = [i for i in range(len(self._planes)) if i not in self._fixed]
         count = len(self._planes) if plane_by_plane else 1
-        self._chains = [self._chain() for _ in range(count)]
+        self._chains = [self._new_chain() for _ in range(count)]
 
     # -- time ----------------------------------------------------------------------------------
 
     def next_scan_s(self, after_s: object = None) -> float:
-        """Return when the next scan of any sensor is, s, to step from scan to scan.
+        """Return when any sensor scans next after a time, s, so that a host can step by scans.
 
         Parameters
         ----------
@@ -191,8 +191,8 @@ class Simulator:
         if not self._chains:
             return self._clocks.next_scan_s(after_s)
         if after_s is not None:
-            return self._clocks.scan_after(self._chains[0].tick_of(after_s))
-        return self._clocks.scan_after(max(chain.last_tick for chain in self._chains))
+            return self._clocks.next_scan_after_tick_s(self._chains[0].tick_of(after_s))
+        return self._clocks.next_scan_after_tick_s(max(chain.last_tick for chain in self._chains))
 
     def simulate(
         self,
@@ -204,7 +204,8 @@ class Simulator:
         *,
         plane: str | int | None = None,
     ) -> EncounterResult:
-        """Return where the planes are detected at an instant, by which sensors and how surely.
+        """Run all scans due at an instant, given positions and attitudes, and return which planes
+        are detected where and by which sensors.
 
         Parameters
         ----------
@@ -241,12 +242,12 @@ class Simulator:
             chain, chosen = self._chains[0], None
             free = self._free
         else:
-            number = number_of(plane, self.planes)
+            number = plane_index(plane, self.planes)
             chain, chosen = self._chains[number], [number]
             free = [] if number in self._fixed else [number]
         moved = check_rows("intruder", lla_intruder, att_intruder, len(free))
         tick = chain.tick_of(time_s)
-        step = chain.due(tick)
+        step = chain.start_step(tick)
         planes_asked = range(len(self._planes)) if chosen is None else chosen
         if step.scans:
             rows = moved
@@ -254,14 +255,14 @@ class Simulator:
                 rows = self._plane_rows(moved, free, planes_asked, tick / chain.ticks_per_s)
             traffic: Any = chain.components[self._source]
             chain.run(step, traffic_states(own, rows, tick, traffic.roster, chosen))
-        return self._result(step, planes_asked, chain.ticks_per_s)
+        return self._make_result(step, planes_asked, chain.ticks_per_s)
 
     # -- inside --------------------------------------------------------------------------------
 
-    def _chain(self) -> HostDriven:
-        return HostDriven(with_host(self.scene, self._planes), self._source, self._wanted)
+    def _new_chain(self) -> HostDriven:
+        return HostDriven(with_host_traffic(self.scene, self._planes), self._source, self._wanted)
 
-    def _only_fusion(self) -> str:
+    def _find_only_fusion(self) -> str:
         fusions = [
             name
             for name, block in self.scene.blocks.items()
@@ -276,7 +277,7 @@ class Simulator:
         return fusions[0]
 
     def _rehearse(self, chain: HostDriven) -> None:
-        """Run every sensor once on every plane at short range, so that later calls are fast."""
+        """Run every sensor once on each plane, close by, to load modules and fill tables ahead."""
         own, count = np.zeros((1, 6)), len(self._planes)
         rows = np.zeros((count, 6))
         rows[:, 0] = 1e-4  # some 600 m ahead
@@ -285,20 +286,24 @@ class Simulator:
             own[0, 2] = rows[:, 2] = terrain.height_m + 1000.0  # nobody flies below the ground
         traffic: Any = chain.components[self._source]
         for _ in range(len(self.scene.blocks)):
-            step = chain.due(chain.tick_of(chain.next_scan_s()))
+            step = chain.start_step(chain.tick_of(chain.next_scan_s()))
             chain.run(step, traffic_states(own, rows, step.tick, traffic.roster, None))
 
     def _plane_rows(
         self, moved: Any, free: list[int], planes_asked: Sequence[int], time_s: float
     ) -> Any:
-        """Return the states of all planes: those given by the host, and the fixed ones."""
+        """Return lat, lon, alt, yaw, pitch, roll of the asked planes, (planes, 6): those the host
+        has moved, and fixed ones at the time.
+        """
         rows = np.empty((len(planes_asked), 6))
         for row, number in enumerate(planes_asked):
             fixed = self._fixed.get(number)
             rows[row] = moved[free.index(number)] if fixed is None else fixed.at(time_s)
         return rows
 
-    def _result(self, step: Step, planes_asked: Sequence[int], ticks_per_s: int) -> EncounterResult:
+    def _make_result(
+        self, step: Step, planes_asked: Sequence[int], ticks_per_s: int
+    ) -> EncounterResult:
         messages: dict[str, Any] = {name: message for (name, _), message in step.sent.items()}
         reported = {n: m for n, m in messages.items() if isinstance(m, Detections)}
         seen, false = sightings_of(messages.get(self._fusion), reported)

@@ -19,7 +19,7 @@ _HIGH = np.array([math.pi / 2, LARGEST, HIGHEST_ALTITUDE_M, LARGEST, LARGEST, LA
 
 
 def to_numbers(label: str, value: object) -> FloatArray:
-    """Return a host's value as an array of numbers; ValueError names it where it is none."""
+    """Return a host's value as a float64 array; ValueError, naming it, if not numbers or masked."""
     mask = getattr(value, "mask", None)
     if mask is not None and np.any(mask):  # what a mask hides would be taken for a number
         raise ValueError(f"{label} has masked values: what is not there is NaN")
@@ -72,7 +72,7 @@ def check_rows(
 def traffic_states(
     own: FloatArray, rows: FloatArray, tick: int, roster: Roster, chosen: list[int] | None
 ) -> TrafficStates:
-    """Return the traffic message of one instant, from rows of `check_rows`.
+    """Return one tick's traffic message, of the ownship's row and rows from `check_rows`.
 
     `chosen` are the planes of the roster that the rows are; None for all.
     """

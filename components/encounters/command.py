@@ -186,9 +186,9 @@ def show(**options: Any) -> None:
 
     FILE is a set, or whatever `convert` reads.
     """
-    from components.encounters.set_commands import show_set
+    from components.encounters.set_commands import print_set
 
-    show_set(**options)
+    print_set(**options)
 
 
 @encounters.command()

@@ -31,7 +31,8 @@ _MOST = 20
 
 @dataclass(frozen=True)
 class EncounterTable:
-    """Columns of texts, or of numbers where the file has types, None where a cell is empty.
+    """Columns of a table with one row per encounter, as texts or as numbers where the file has
+    types; None for an empty cell.
 
     `lines` says where each row stands in the file, from 1.
     """
@@ -41,7 +42,7 @@ class EncounterTable:
     lines: list[int]
 
     def column(self, name: str, option: str) -> list[object]:
-        """Return a column, or raise UsageError with the nearest name."""
+        """Return a column's cells; UsageError, with option and nearest column, if missing."""
         if name not in self.columns:
             raise UsageError(
                 f"{self.path}: {option} {name}: there is no such column"
@@ -50,20 +51,20 @@ class EncounterTable:
         return self.columns[name]
 
     def row_name(self, row: int) -> str:
-        """Return how a row is named in a message."""
+        """Return the words by which an error message names a row: its encounter and its line."""
         name = next((n for n in _NAMES if n in self.columns), None)
         name_of_row = f"encounter {self.columns[name][row]}" if name else f"encounter {row + 1}"
         return f"{name_of_row} (line {self.lines[row]})"
 
 
 def read_table(text: str) -> EncounterTable:
-    """Read a table by the name that a user wrote."""
+    """Return a CSV or Parquet file's or study folder's table; UsageError if it cannot be used."""
     try:
         path = resolve_home(text)
         if is_folder(path):
-            return _study(path)
+            return _read_study(path)
         if path.suffix.lower() == ".parquet":
-            return _parquet(path, read_input_bytes(path))
+            return _read_parquet(path, read_input_bytes(path))
         content = read_input_text(path)
     except InputFileError as error:
         raise UsageError(f"{text}: {error}") from None
@@ -80,8 +81,8 @@ def read_table(text: str) -> EncounterTable:
     return EncounterTable(path, columns, [line for line, _ in rows])
 
 
-def _study(path: Path) -> EncounterTable:
-    """Return the runs of a study's folder; those without result are left out."""
+def _read_study(path: Path) -> EncounterTable:
+    """Return the runs of a study's folder as a table, without the runs that failed."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -102,7 +103,7 @@ def _study(path: Path) -> EncounterTable:
     return EncounterTable(path, {n: table[n].to_pylist() for n in table.column_names}, lines)
 
 
-def _parquet(path: Path, content: bytes) -> EncounterTable:
+def _read_parquet(path: Path, content: bytes) -> EncounterTable:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -116,10 +117,10 @@ def _parquet(path: Path, content: bytes) -> EncounterTable:
     return EncounterTable(path, columns, list(range(1, table.num_rows + 1)))
 
 
-def numbers(
+def numbers_and_errors(
     table: EncounterTable, name: str, option: str, *, flag: bool
 ) -> tuple[FloatArray, dict[int, str]]:
-    """Return a column as numbers, and row → what is wrong with it."""
+    """Return a column as numbers (flags 0 or 1, else at least 0), and the error of each bad row."""
     cells = table.column(name, option)
     values = np.array([_number(cell) for cell in cells])
     with np.errstate(invalid="ignore"):
@@ -151,7 +152,7 @@ def _number(cell: object) -> float:
 def select_good_rows(
     table: EncounterTable, wrong: Sequence[dict[int, str]], skip: bool
 ) -> BoolArray:
-    """Return which rows are good, or raise UsageError with what is wrong with the others."""
+    """Return which rows have no error (mask); UsageError on others unless they may be skipped."""
     problems: dict[int, list[str]] = {}
     for some in wrong:
         for row, said in some.items():
@@ -184,19 +185,19 @@ def show_risk(
     skip_damaged: bool,
     as_json: bool,
 ) -> None:
-    """Print the risk ratio of a table, and one per class where that is asked for."""
+    """Print the risk ratio of a table of encounters and, on request, of their classes."""
     if edges is not None and by is None:
         raise UsageError("--edges belongs to --by COLUMN: which column has these edges?")
     content = read_table(table)
-    n, wrong_n = numbers(content, nominal, "--nominal", flag=True)
-    m, wrong_m = numbers(content, mitigated, "--mitigated", flag=True)
+    n, wrong_n = numbers_and_errors(content, nominal, "--nominal", flag=True)
+    m, wrong_m = numbers_and_errors(content, mitigated, "--mitigated", flag=True)
     w, wrong_w = np.ones(len(n)), dict[int, str]()
     if weight is not None:
-        w, wrong_w = numbers(content, weight, "--weight", flag=False)
+        w, wrong_w = numbers_and_errors(content, weight, "--weight", flag=False)
     together = None
     if cluster is not None:
         together = np.array([str(cell) for cell in content.column(cluster, "--cluster")])
-    labels, wrong_by = _labels(content, by, edges)
+    labels, wrong_by = _class_labels_and_errors(content, by, edges)
     kept = select_good_rows(content, [wrong_n, wrong_m, wrong_w, wrong_by], skip_damaged)
     n, m, w, labels = n[kept], m[kept], w[kept], labels[kept]
     together = None if together is None else together[kept]
@@ -216,16 +217,16 @@ def show_risk(
             result["classes"] = {name: asdict(one) for name, one in classes.items()}
         say_json(result)
         return
-    for line in _lines(whole, confidence, skipped):
+    for line in _risk_lines(whole, confidence, skipped):
         say(line)
     if by is not None:
         _show_classes(by, classes, confidence)
 
 
-def _labels(
+def _class_labels_and_errors(
     content: EncounterTable, by: str | None, edges: str | None
 ) -> tuple[AnyArray, dict[int, str]]:
-    """Return the class of every row, and what is wrong with single ones."""
+    """Return each row's class label, and for each row without one the words on its error."""
     if by is None:
         return np.zeros(len(content.lines), dtype=np.int64), {}
     if edges is None:
@@ -240,7 +241,7 @@ def _labels(
                 "classes, --edges A,B,..."
             )
         return labels, {}
-    bounds = _edges(edges)
+    bounds = _parse_edges(edges)
     cells = content.column(by, "--by")
     values, wrong = np.full(len(cells), np.nan), {}
     for row, cell in enumerate(cells):
@@ -256,7 +257,7 @@ def _labels(
     return np.array([f"{k + 1:0{width}d}: {name}" for k, name in enumerate(names)])[index], wrong
 
 
-def _edges(text: str) -> FloatArray:
+def _parse_edges(text: str) -> FloatArray:
     try:
         bounds = np.array([float(part) for part in text.split(",")])
     except ValueError:
@@ -266,10 +267,10 @@ def _edges(text: str) -> FloatArray:
     return bounds
 
 
-def _lines(risk: RiskRatio, confidence: float, skipped: int) -> list[str]:
+def _risk_lines(risk: RiskRatio, confidence: float, skipped: int) -> list[str]:
     alone = risk.clusters == risk.encounters
     clusters = "" if alone else f" in {risk.clusters} clusters"
-    shown = _digits(risk)
+    shown = _number_format(risk)
     low, high = map(shown, risk.interval)
     lines = [
         f"{risk.encounters} encounters{clusters}, {risk.nominal_events} with the event "
@@ -291,8 +292,8 @@ def _lines(risk: RiskRatio, confidence: float, skipped: int) -> list[str]:
     return lines
 
 
-def _digits(risk: RiskRatio) -> Callable[[float], str]:
-    """Return a function that formats numbers with three digits, or by their interval's width."""
+def _number_format(risk: RiskRatio) -> Callable[[float], str]:
+    """Return a function that formats three significant digits, more if the interval is narrow."""
     half = (risk.interval[1] - risk.interval[0]) / 2
     digits = 3
     if risk.ratio > 0 and half > 0:
@@ -309,7 +310,7 @@ def _show_classes(by: str, classes: dict[str, RiskRatio], confidence: float) -> 
             rows.append([*counts, "-", "-", "-", "-", one.reason])
             continue
         low, high = one.interval
-        shown = _digits(one)
+        shown = _number_format(one)
         values = (one.ratio, one.unresolved, one.induced)
         interval = f"{shown(low)} to {shown(high)}"
         rows.append([*counts, *map(shown, values), interval, "few" if one.few else ""])

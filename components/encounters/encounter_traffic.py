@@ -14,10 +14,10 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.encounters.made_encounters import read_made
+from components.encounters.made_encounters import read_made_set
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import MissDistances, PairingRules, pairing_rules
-from components.encounters.pairing import PairSampler, set_of_pairs
+from components.encounters.pairing import PairSampler, encounter_set_of_pairs
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.sampled_segments import STRAIGHT_ROWS
@@ -26,7 +26,7 @@ from components.formats.set_file import read_set
 from components.formats.text_rows import TrafficFile
 from components.geometry import enu_to_geodetic, line_of_sight
 from components.traffic.recorded import FileParameters, RecordedTraffic
-from components.traffic.scripted import Ownship, flight_of
+from components.traffic.scripted import Ownship, scripted_flight
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
 from dsa_des.block.ladder import Verified
@@ -38,7 +38,7 @@ _Craft = tuple[EncounterSet, int, str]
 
 
 class MadeTogether:
-    """What is made of many keys at once and then asked for one by one, several times each.
+    """A cache of things that are made for many keys at once and then looked up one by one.
 
     The last batch is kept whole, however many it holds, until the next one takes its place: what a
     batch needs is never made twice. Of keys that no batch named the last few are kept.
@@ -50,7 +50,7 @@ class MadeTogether:
         self._single: dict[Any, Any] = {}
 
     def prepare(self, keys: Iterable[Any]) -> None:
-        """Begin a batch: make what the last one lacks of its keys, and forget all others.
+        """Make and keep what these keys lack, all at once, and drop everything for other keys.
 
         What was made of a key alone is made again: what is made at once lies together in memory.
         """
@@ -75,13 +75,13 @@ _SINGLE = 16
 def encounter_flights(
     encounter_set: EncounterSet, index: int, dynamics: str
 ) -> list[SampledTrajectory]:
-    """Return the flights of an encounter, by its index in the set, the ownship's first."""
+    """Return the flights of the encounter at an index of a set, the ownship's first; cached."""
     flights: list[SampledTrajectory] = _FLIGHTS[encounter_set, index, dynamics]
     return flights
 
 
-def _flights_of(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[SampledTrajectory]]:
-    """Return the flights of each encounter, to the bit as if it were asked for alone."""
+def _make_flights(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[SampledTrajectory]]:
+    """Return the flights of each encounter; bit for bit the same whether made alone or together."""
     rows = [range(*of.first_rows[index : index + 2].tolist()) for of, index, _ in keys]
     aircraft = [
         (of, row, dynamics) for (of, _, dynamics), mine in zip(keys, rows, strict=True)
@@ -93,22 +93,22 @@ def _flights_of(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[Samp
         alike.setdefault((of.kind, lasts, of.reference_deg, dynamics), []).append(number)
     made: dict[int, SampledTrajectory] = {}
     for numbers in alike.values():
-        count = len(_paths([aircraft[numbers[0]]])[0])
+        count = len(_time_and_positions([aircraft[numbers[0]]])[0])
         table = np.empty((len(numbers) * count, STRAIGHT_ROWS))
         width = max(1, CELLS_AT_ONCE // count)
         for first in range(0, len(numbers), width):
             some = numbers[first : first + width]
-            flown = _fly_alike([aircraft[k] for k in some], (table, first * count))
+            flown = _fly_same_times([aircraft[k] for k in some], (table, first * count))
             made.update(zip(some, flown, strict=True))
     each = iter(range(len(aircraft)))
     return [[made[next(each)] for _ in mine] for mine in rows]
 
 
-_FLIGHTS = MadeTogether(_flights_of)
+_FLIGHTS = MadeTogether(_make_flights)
 
 
-def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
-    """Return time (s), north, east and altitude (m) of aircraft known at the same times."""
+def _time_and_positions(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
+    """Return time (s), north, east, altitude (m), (times, aircraft), of aircraft sharing times."""
     encounter_set, row, dynamics = aircraft[0]
     if encounter_set.kind != TRACKS:
         return fly_events([(of, row) for of, row, _ in aircraft], dynamics)
@@ -116,17 +116,17 @@ def _paths(aircraft: Sequence[_Craft]) -> tuple[FloatArray, ...]:
     return time_s, *(part[:, np.newaxis] for part in position)
 
 
-def _fly_alike(
+def _fly_same_times(
     aircraft: Sequence[_Craft], place: tuple[FloatArray, int]
 ) -> list[SampledTrajectory]:
-    time_s, north, east, altitude = _paths(aircraft)
+    time_s, north, east, altitude = _time_and_positions(aircraft)
     origin = aircraft[0][0].reference_deg
     lat, lon, _ = enu_to_geodetic(
         east, north, 0.0,
         reference_lat_deg=origin[0], reference_lon_deg=origin[1], reference_alt_m=0.0,
     )  # fmt: skip
     names = [encounter_set.names[row] for encounter_set, row, _ in aircraft]
-    return SampledTrajectory.make_all(names, time_s, lat, lon, altitude, place)
+    return SampledTrajectory.from_common_times(names, time_s, lat, lon, altitude, place)
 
 
 #: Beyond it nothing can meet; the plane in which encounters lie is far above the ground there.
@@ -192,14 +192,14 @@ class ModelParameters(OneEncounter):
     )
 
     @model_validator(mode="after")
-    def _densities(self) -> Any:
+    def _check_densities(self) -> Any:
         self.pairing_rules()
         return self
 
     def pairing_rules(self) -> PairingRules:
-        """Return how tracks become encounters; ValueError where edges or proportions do not fit."""
+        """Return the pairing rules; ValueError where edges or proportions do not fit."""
         both = self.horizontal, self.vertical
-        return pairing_rules(*(None if one is None else one.steps for one in both))
+        return pairing_rules(*(None if one is None else one.edges_and_proportions for one in both))
 
 
 class _EncounterTraffic(RecordedTraffic):
@@ -216,15 +216,15 @@ class _EncounterTraffic(RecordedTraffic):
         super().__init__(name, parameters, context)
         if (own := self.p.scripted_ownship) is not None:
             self._refuse_another_place(own.lat_deg, own.lon_deg)
-            own = own.in_air(self.air)
-            self.own = flight_of(own, own.start, self.wind)
-            self._let_ownship_be(own)
+            own = own.with_ellipsoid_heights(self.air)
+            self.own = scripted_flight(own, own.start, self.wind)
+            self._set_ownship_properties(own)
 
     def read(self) -> TrafficFile:
-        """Return the flights of the encounter."""
+        """Return the named encounter's flights, as a traffic file would give them."""
         if (self.p.lat_deg is None) != (self.p.lon_deg is None):
             raise ValueError("lat_deg and lon_deg belong together: give both, or neither")
-        self.encounter_set, self.index = _encounter_of(type(self), self.p)
+        self.encounter_set, self.index = _moved_encounter_of_parameters(type(self), self.p)
         own, *others = encounter_flights(self.encounter_set, self.index, self.p.dynamics)
         notes = [f"encounter {self.encounter_set.numbers[self.index]}{self.set_size_text()}"]
         if self.encounter_set.skipped:
@@ -232,19 +232,21 @@ class _EncounterTraffic(RecordedTraffic):
         return TrafficFile(own, others, 0.0, notes, notes[1:], height=self.said_height)
 
     def set_size_text(self) -> str:
-        """Return how many encounters there are to choose from, in words; nothing if any number."""
+        """Return in words how many encounters the set has, to follow the flown one's number."""
         return f" of {len(self.encounter_set)}"
 
     @classmethod
     def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
-        """Return the encounter of each of many blocks: its set and its index there."""
+        """Return for each block's parameters the set of its encounter and the index there."""
         return [encounter_of_parameters(cls, p) for p in parameters]
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
-        """Make the flights that many blocks will ask for, all at once."""
+        """Make and cache the flights of many blocks' encounters at once."""
         with suppress(ValueError):  # what is wrong is said by the block that asks for it
-            _FLIGHTS.prepare([(*_encounter_of(cls, p), p.dynamics) for p in parameters])
+            _FLIGHTS.prepare(
+                [(*_moved_encounter_of_parameters(cls, p), p.dynamics) for p in parameters]
+            )
 
     def _refuse_another_place(self, lat_deg: float, lon_deg: float) -> None:
         at = self.encounter_set.reference_deg
@@ -290,37 +292,37 @@ class ModelTraffic(_EncounterTraffic):
         return notes + super().warnings()
 
     def set_size_text(self) -> str:
-        """Return nothing: a model makes as many as are asked for."""
+        """Return an empty text, as a model makes any number of encounters."""
         return ""
 
     @classmethod
     def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
-        """Return the encounters of many blocks, made at once."""
+        """Return each block's encounter as a set and an index there, all sampled at once."""
         keys = [_pair_key(p) for p in parameters]
         _PAIRS.prepare(keys)
         return [_PAIRS[key] for key in keys]
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
-        """Compute and cache the encounters and flights of many parameter sets at once."""
+        """Sample and cache the encounters and the flights of many blocks at once."""
         _PAIRS.prepare([_pair_key(p) for p in parameters])
         super().prepare(parameters)
 
 
 def encounter_of_parameters(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the set of an encounter that a block's parameters name, and its index there."""
+    """Return the encounter set that a block's parameters name, at its own origin, and the index."""
     if issubclass(cls, ModelTraffic):
         found: Encounter = _PAIRS[_pair_key(parameters)]
         return found
     if parameters.file.suffix == ".toml":
-        encounter_set = read_made(parameters.file)
+        encounter_set = read_made_set(parameters.file)
     else:
         encounter_set = read_set(parameters.file, parameters.skip_damaged)
     return encounter_set, encounter_set.index_of(parameters.encounter)
 
 
-def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the set of an encounter where the scene puts it, and its index there."""
+def _moved_encounter_of_parameters(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
+    """Return the encounter's set, moved to the origin in the parameters, and its index there."""
     encounter_set, index = encounter_of_parameters(cls, parameters)
     at = parameters.lat_deg, parameters.lon_deg
     made_there = None in at or at == encounter_set.reference_deg
@@ -329,13 +331,13 @@ def _encounter_of(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
 
 @lru_cache(maxsize=16)
 def _move_set(encounter_set: EncounterSet, reference_deg: tuple[float, float]) -> EncounterSet:
-    """Return a set elsewhere, the same object each time: flights are kept by it."""
+    """Return the set moved to an origin, the same object each time, as flights are cached by it."""
     return replace(encounter_set, reference_deg=reference_deg)
 
 
 @dataclass(frozen=True, eq=False)
 class _Model:
-    """The sampler of a model's encounters, and their origin.
+    """The models, seed, miss distances and origin that determine a sequence of encounters.
 
     It is itself a key, of one object for all that are alike (`_model_of`).
     """
@@ -350,7 +352,9 @@ class _Model:
 
     @property
     def sampler(self) -> PairSampler:
-        return _sampler(self.file, self.intruder, self.seed, self.horizontal, self.vertical)
+        return _make_pair_sampler(
+            self.file, self.intruder, self.seed, self.horizontal, self.vertical
+        )
 
     @property
     def reference_deg(self) -> tuple[float, float]:
@@ -367,8 +371,10 @@ def _pair_key(parameters: Any) -> tuple[_Model, int]:
     return _model_of(*made_by, p.lat_deg, p.lon_deg), p.encounter
 
 
-def _pairs_of(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
-    """Return encounters of models, in sets of many that are drawn together."""
+def _sample_pairs(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
+    """Return for each model and number the set that holds its encounter and the index there;
+    encounters of one model are sampled together.
+    """
     numbers_of: dict[_Model, set[int]] = {}
     for model, number in keys:
         numbers_of.setdefault(model, set()).add(number)
@@ -376,20 +382,20 @@ def _pairs_of(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
     for model, chosen in numbers_of.items():
         sampler, numbers = model.sampler, np.array(sorted(chosen), dtype=np.int64)
         for first in range(0, len(numbers), _PAIRS_AT_ONCE):
-            pairs = sampler.pairs(numbers[first : first + _PAIRS_AT_ONCE], paths=False)
+            pairs = sampler.sample_pairs(numbers[first : first + _PAIRS_AT_ONCE], paths=False)
             closest_s, source = sampler.rules.closest_s, str(model.file)
-            some = set_of_pairs(pairs, closest_s, model.reference_deg, source)
+            some = encounter_set_of_pairs(pairs, closest_s, model.reference_deg, source)
             made |= {(model, n): (some, index) for index, n in enumerate(pairs.numbers.tolist())}
     return [made[key] for key in keys]
 
 
 #: So many encounters of a model make one set: their arrays stay small.
 _PAIRS_AT_ONCE = 4096
-_PAIRS = MadeTogether(_pairs_of)
+_PAIRS = MadeTogether(_sample_pairs)
 
 
 @lru_cache(maxsize=4)
-def _sampler(
+def _make_pair_sampler(
     file: Path,
     intruder: Path,
     seed: int,

@@ -79,10 +79,10 @@ class ClosestApproachPassed(Component):
         if states is None or len(states.columns) == 0:
             return None
         range_m, present = self._ranges_m(states)
-        starts = wake.instants.first_of_each
+        starts = wake.instants.first_position_of_runs
         numbers = wake.run[starts]
         shape = range_m.shape[1], len(numbers)
-        known = self._known.latest_or_new(
+        known = self._known.kept_rows_or_new(
             KeyedTable(
                 replica=numbers,
                 range_m=np.full(shape, np.inf),
@@ -118,7 +118,9 @@ class ClosestApproachPassed(Component):
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
 
     def _ranges_m(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:
-        """Return the distances between pairs at every row, and whether both aircraft are there."""
+        """Return the distances (rows, pairs) in m between all aircraft or from the ownship, and
+        whether both are present.
+        """
         own = [getattr(states, f"own_{name}")[:, np.newaxis] for name in POSITION_FIELDS]
         others = [getattr(states, name) for name in POSITION_FIELDS]
         if self.p.between != "any two":

@@ -19,8 +19,8 @@ from components.flights.closest_geometry import (
     SENSES,
     Approach,
     fly_paths,
-    intruder_heading,
-    project_to_plane,
+    intruder_headings,
+    project_to_north_east_m,
 )
 from components.formats.encounter_set import (
     LARGEST_WEIGHT,
@@ -32,8 +32,13 @@ from components.formats.encounter_set import (
 from components.formats.set_file import EncounterSetError, is_origin
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError, did_you_mean, shown_value
-from dsa_des.errors.budgets import refuse_samples
-from dsa_des.files.input_files import InputFileError, cache_reads, read_input_text, resolve_home
+from dsa_des.errors.budgets import check_sample_count
+from dsa_des.files.input_files import (
+    InputFileError,
+    cache_file_reads,
+    read_input_text,
+    resolve_home,
+)
 from dsa_des.files.toml_files import parse_toml
 
 _LENGTH, _SPEED = {"m": 1.0, "ft": FOOT_M}, {"mps": 1.0, "kt": KNOT_M_S}
@@ -43,7 +48,7 @@ _TIME = {"s": 1.0}
 
 @dataclass(frozen=True)
 class _Quantity:
-    """Units of a quantity, its value if left out (None: required), and its limits in SI."""
+    """A quantity's units with factors to SI, its default (None if required), and limits in SI."""
 
     units: Mapping[str, float]
     default: float | None
@@ -74,7 +79,7 @@ _TRIES = 200
 
 @dataclass(frozen=True)
 class Recipe:
-    """What a table asks for, in SI units.
+    """What a TOML table of encounters made by hand asks for, in SI units.
 
     Of each swept combination `fixed` gives every quantity, as a value or as (low, high) where it is
     drawn, `geometries` the geometry, and `courses` which of the two courses that lead there it
@@ -94,13 +99,13 @@ class Recipe:
 
 
 def read_recipe(text: str) -> Recipe:
-    """Read a table of encounters."""
+    """Return a TOML file's recipe of encounters; UsageError with everything wrong in it."""
     try:
         path = resolve_home(text)
         tables = parse_toml(read_input_text(path))
     except (InputFileError, ValueError) as error:
         raise UsageError(f"{text}: {error}") from None
-    return _Recipes(path, tables).recipe()
+    return _Recipes(path, tables).make_recipe()
 
 
 class _Recipes:
@@ -108,55 +113,58 @@ class _Recipes:
         self.path, self.tables = path, tables
         self.wrong: list[str] = []
 
-    def add(self, key: str, message: str) -> None:
+    def add_error(self, key: str, message: str) -> None:
         shown = f" = {shown_value(self.tables[key])}" if key in self.tables else ""
         self.wrong.append(f"{self.path}: {key}{shown}: {message}")
 
-    def recipe(self) -> Recipe:
+    def make_recipe(self) -> Recipe:
         names = {f"{q}_{u}": (q, u) for q, spec in QUANTITIES.items() for u in spec.units}
         for key in self.tables:
             if key not in names and key not in _OTHERS:
-                self.add(key, f"unknown key{did_you_mean(key, [*names, *_OTHERS])}")
+                self.add_error(key, f"unknown key{did_you_mean(key, [*names, *_OTHERS])}")
         swept: dict[str, list[Any]] = {}
         for quantity, spec in QUANTITIES.items():
             given = [key for key, (q, _) in names.items() if q == quantity and key in self.tables]
             if len(given) > 1:
-                self.add(given[1], f"is given twice, as {given[0]} too")
+                self.add_error(given[1], f"is given twice, as {given[0]} too")
             if not given:
                 if spec.default is None:
                     units = " or ".join(f"{quantity}_{unit}" for unit in spec.units)
-                    self.add(f"{quantity}_{next(iter(spec.units))}", f"is required ({units})")
+                    self.add_error(f"{quantity}_{next(iter(spec.units))}", f"is required ({units})")
                 swept[quantity] = [spec.default]
                 continue
-            swept[quantity] = self.values(given[0], spec, spec.units[names[given[0]][1]])
+            swept[quantity] = self.read_values(given[0], spec, spec.units[names[given[0]][1]])
         geometries = self.tables.get("geometry", "any")
         geometries = geometries if isinstance(geometries, list) else [geometries]
         for name in geometries:
             if name not in GEOMETRIES:
-                self.add("geometry", f"must be of {', '.join(GEOMETRIES)}")
+                self.add_error("geometry", f"must be of {', '.join(GEOMETRIES)}")
         swept["geometry"] = geometries
         sense = self.tables.get("sense", "slant")
         if self.tables.get("courses", "one") not in COURSES:
-            self.add("courses", f"must be {' or '.join(COURSES)}")
+            self.add_error("courses", f"must be {' or '.join(COURSES)}")
         elif self.tables.get("courses") == "every":
             drawn = [q for q in _OF_COURSES if any(isinstance(v, tuple) for v in swept[q])]
             if drawn:
-                self.add("courses", f"is of numbers; {' and '.join(drawn)} must not be drawn")
+                self.add_error("courses", f"is of numbers; {' and '.join(drawn)} must not be drawn")
         if sense not in SENSES:
-            self.add("sense", f"must be {' or '.join(SENSES)}")
-        count, seed = self.whole("count", 1, 1, _MOST), self.whole("seed", 0, 0, 2**62)
-        duration = self.number("duration_s", 120.0, 0.1, 86_400.0)
-        weight = self.number("weight", 1.0, 1e-100, LARGEST_WEIGHT)
+            self.add_error("sense", f"must be {' or '.join(SENSES)}")
+        count, seed = (
+            self.read_whole_number("count", 1, 1, _MOST),
+            self.read_whole_number("seed", 0, 0, 2**62),
+        )
+        duration = self.read_number("duration_s", 120.0, 0.1, 86_400.0)
+        weight = self.read_number("weight", 1.0, 1e-100, LARGEST_WEIGHT)
         at = self.tables.get("at", [0.0, 0.0])
         if not is_origin(at):
-            self.add("at", "must be [latitude, longitude] in degrees, within ±89 and ±360")
+            self.add_error("at", "must be [latitude, longitude] in degrees, within ±89 and ±360")
         if self.wrong:
             raise UsageError(*self.wrong)
         if count * math.prod(map(len, swept.values())) > _MOST:
             raise UsageError(f"{self.path}: makes more than {_MOST:,} encounters")
         total = count * math.prod(map(len, swept.values()))
         asked = f"{self.path}: {total:,} encounters of {duration:g} s"
-        refuse_samples(asked, 2.0 * total * (duration + 1.0))
+        check_sample_count(asked, 2.0 * total * (duration + 1.0))
         every = [
             dict(zip(swept, values, strict=True)) for values in itertools.product(*swept.values())
         ]
@@ -173,47 +181,49 @@ class _Recipes:
             self.path, every, kinds, count, seed, origin, duration, weight, sense, courses
         )
 
-    def values(self, key: str, spec: _Quantity, factor: float) -> list[Any]:
-        """Return the values of a quantity in turn: numbers, or ranges to draw them from."""
+    def read_values(self, key: str, spec: _Quantity, factor: float) -> list[Any]:
+        """Return a quantity's values to sweep, SI: numbers, or (low, high) to draw from."""
         given = self.tables[key]
         result: list[Any] = []
         for item in given if isinstance(given, list) else [given]:
             ends = item.get("uniform") if isinstance(item, dict) and len(item) == 1 else [item]
             if not isinstance(ends, list) or not ends or not all(map(_is_number, ends)):
-                self.add(key, "must be a number, a list of numbers, or {uniform = [low, high]}")
+                self.add_error(
+                    key, "must be a number, a list of numbers, or {uniform = [low, high]}"
+                )
                 return []
             if isinstance(item, dict) and (len(ends) != 2 or ends[1] < ends[0]):
-                self.add(key, "uniform takes [low, high], the lower one first")
+                self.add_error(key, "uniform takes [low, high], the lower one first")
                 return []
             scaled = [float(end) * factor for end in ends]
             if min(scaled) < spec.low or max(scaled) > spec.high:
                 limits = f"{spec.low / factor:g} to {spec.high / factor:g}"
-                self.add(key, f"must lie from {limits}")
+                self.add_error(key, f"must lie from {limits}")
                 return []
             result.append(tuple(scaled) if isinstance(item, dict) else scaled[0])
         if not result:
-            self.add(key, "is an empty list")
+            self.add_error(key, "is an empty list")
         return result
 
-    def whole(self, key: str, default: int, low: int, high: int) -> int:
+    def read_whole_number(self, key: str, default: int, low: int, high: int) -> int:
         value = self.tables.get(key, default)
         if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
-            self.add(key, f"must be a whole number from {low} to {high}")
+            self.add_error(key, f"must be a whole number from {low} to {high}")
             return default
         return value
 
-    def number(self, key: str, default: float, low: float, high: float) -> float:
+    def read_number(self, key: str, default: float, low: float, high: float) -> float:
         value = self.tables.get(key, default)
         if not _is_number(value) or not low <= value <= high:
-            self.add(key, f"must be a number from {low:g} to {high:g}")
+            self.add_error(key, f"must be a number from {low:g} to {high:g}")
             return default
         return float(value)
 
 
 def _available_courses(one: Mapping[str, Any]) -> list[int]:
-    """Return which of the two courses there are for a combination."""
+    """Return which of courses 0 and 1 lead an intruder of this speed to the wanted bearing."""
     speeds = np.array([one["own_speed"]]), np.array([one["intruder_speed"]])
-    both = intruder_heading(np.zeros(1), *speeds, np.array([one["bearing"]]))
+    both = intruder_headings(np.zeros(1), *speeds, np.array([one["bearing"]]))
     return [k for k, heading in enumerate(both) if not np.isnan(heading[0])]
 
 
@@ -221,9 +231,9 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-@cache_reads(32)
-def read_made(path: Path) -> EncounterSet:
-    """Return the encounters of a table."""
+@cache_file_reads(32)
+def read_made_set(path: Path) -> EncounterSet:
+    """Return the encounter set of a TOML table; EncounterSetError if it cannot be used."""
     try:
         return make_set(read_recipe(str(path)))
     except UsageError as error:
@@ -231,7 +241,7 @@ def read_made(path: Path) -> EncounterSet:
 
 
 def make_set(recipe: Recipe) -> EncounterSet:
-    """Return the encounters of a recipe, combination after combination."""
+    """Return the set of encounters of a recipe, swept combination after combination."""
     total = recipe.count * len(recipe.fixed)
     combination = np.repeat(np.arange(len(recipe.fixed)), recipe.count)
     draws = EncounterDraws(recipe.seed, "made encounters")
@@ -239,33 +249,39 @@ def make_set(recipe: Recipe) -> EncounterSet:
     values, course = np.zeros((len(names), total)), np.full(total, np.nan)
     left = np.arange(total)
     for attempt in range(_TRIES):
-        drawn = draws.uniform_of_few(left, len(names) + 1, attempt)
+        drawn = draws.uniform_fast(left, len(names) + 1, attempt)
         for k, name in enumerate(names):
             ends = [recipe.fixed[c][name] for c in combination[left]]
             low, high = np.array([e if isinstance(e, tuple) else (e, e) for e in ends]).T
             values[k, left] = low + (high - low) * drawn[k]
-        course[left] = _courses(
+        course[left] = _intruder_headings(
             recipe, combination[left], dict(zip(names, values[:, left], strict=True))
         )
-        approach = _approach(recipe, dict(zip(names, values[:, left], strict=True)), course[left])
+        approach = _make_approach(
+            recipe, dict(zip(names, values[:, left], strict=True)), course[left]
+        )
         possible = ~np.isnan(course[left])
         possible &= fly_paths(approach, np.zeros(len(left)), np.zeros(1))[3]
         free = np.array([any(isinstance(v, tuple) for v in recipe.fixed[c].values())
                          for c in combination[left]])  # fmt: skip
         stuck = left[~possible & ~free]
         if len(stuck):
-            _refuse(
+            _raise_impossible_encounter(
                 recipe, int(stuck[0]), int(combination[stuck[0]]), bool(np.isnan(course[stuck[0]]))
             )
         left = left[~possible]
         if not len(left):
             break
     else:
-        _refuse(recipe, int(left[0]), int(combination[left[0]]), bool(np.isnan(course[left[0]])))
+        _raise_impossible_encounter(
+            recipe, int(left[0]), int(combination[left[0]]), bool(np.isnan(course[left[0]]))
+        )
     return _columns_to_set(recipe, dict(zip(names, values, strict=True)), course)
 
 
-def _refuse(recipe: Recipe, number: int, combination: int, no_course: bool) -> None:
+def _raise_impossible_encounter(
+    recipe: Recipe, number: int, combination: int, no_course: bool
+) -> None:
     wanted = recipe.geometries[combination]
     why = (
         f"no course of an intruder at this speed comes from this bearing"
@@ -277,9 +293,9 @@ def _refuse(recipe: Recipe, number: int, combination: int, no_course: bool) -> N
     raise UsageError(f"{recipe.path}: encounter {number}: {why}")
 
 
-def _courses(recipe: Recipe, combination: Any, v: dict[str, FloatArray]) -> FloatArray:
-    """Return the intruders' headings, NaN where none is of the geometry that is asked for."""
-    both = intruder_heading(v["own_heading"], v["own_speed"], v["intruder_speed"], v["bearing"])
+def _intruder_headings(recipe: Recipe, combination: Any, v: dict[str, FloatArray]) -> FloatArray:
+    """Return intruder headings, rad, for the wanted geometry; NaN where none gives the bearing."""
+    both = intruder_headings(v["own_heading"], v["own_speed"], v["intruder_speed"], v["bearing"])
     course = np.full(len(combination), np.nan)
     wanted = np.array([recipe.geometries[c] for c in combination])
     for k, heading in enumerate(both):
@@ -292,7 +308,7 @@ def _courses(recipe: Recipe, combination: Any, v: dict[str, FloatArray]) -> Floa
     return course
 
 
-def _approach(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> Approach:
+def _make_approach(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> Approach:
     return Approach(
         *recipe.at_deg,
         np.stack([v["own_altitude"], v["own_altitude"] + v["vertical"]]),
@@ -308,10 +324,10 @@ def _approach(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> A
 def _columns_to_set(recipe: Recipe, v: dict[str, FloatArray], course: FloatArray) -> EncounterSet:
     total = len(course)
     time_s = np.append(np.arange(0.0, recipe.duration_s, 1.0), recipe.duration_s)
-    lat, lon, alt, _ = fly_paths(_approach(recipe, v, course), v["closest"], time_s)
+    lat, lon, alt, _ = fly_paths(_make_approach(recipe, v, course), v["closest"], time_s)
     # Rows of the file: both aircraft of each encounter in turn.
     lat, lon, alt = (x.transpose(1, 0, 2).reshape(-1) for x in (lat, lon, alt))
-    north, east = project_to_plane(lat, lon, recipe.at_deg)
+    north, east = project_to_north_east_m(lat, lon, recipe.at_deg)
     off = np.degrees(course - v["own_heading"]) % 360.0
     return EncounterSet(
         str(recipe.path),

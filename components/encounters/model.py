@@ -15,7 +15,7 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
 class NetworkError(ValueError):
-    """A network that cannot be: `variable` says which of its variables is wrong, if one is."""
+    """A Bayesian network that is not valid; `variable` names the one at fault, if any."""
 
     def __init__(self, message: str, variable: str = "") -> None:
         super().__init__(f"variable '{variable}': {message}" if variable else message)
@@ -24,7 +24,7 @@ class NetworkError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class NetworkNode:
-    """One variable given its parents, which are ascending indices in the network.
+    """One variable of a Bayesian network, with counts given its parents (ascending indices).
 
     A bin more of a parent adds its stride to the column of `counts` (columns, size).
     """
@@ -37,24 +37,24 @@ class NetworkNode:
 
     @cached_property
     def totals(self) -> FloatArray:
-        """Sum of each column's counts."""
+        """Sum of the counts for each combination of the parents' bins, shape (columns,)."""
         return self.counts.sum(axis=1)
 
     @cached_property
     def empty(self) -> BoolArray:
-        """Return whether each column of counts is all zeros."""
+        """Whether all counts are 0 for each combination of the parents' bins, shape (columns,)."""
         return self.totals == 0.0
 
     @cached_property
     def probabilities(self) -> FloatArray:
-        """Probabilities, shape (columns, size); an empty column holds those of all columns."""
+        """Bin probabilities given parents (columns, size); of all where a column lacks counts."""
         filled = np.where(self.empty[:, np.newaxis], self.counts.sum(axis=0), self.counts)
         result: FloatArray = filled / filled.sum(axis=1, keepdims=True)
         return result
 
     @cached_property
     def edges(self) -> FloatArray:
-        """Where each bin begins and the last one ends within [0, 1], shape (columns, size + 1)."""
+        """Cumulative probabilities 0 to 1 between bins given parents, (columns, size + 1)."""
         summed = np.cumsum(self.probabilities, axis=1)
         # Exactly 1 from the last bin on that can be drawn: rounding must not open a bin without
         # any probability behind it.
@@ -64,11 +64,11 @@ class NetworkNode:
 
     @cached_property
     def flat_edges(self) -> FloatArray:
-        """`edges`, row after row."""
+        """Elements of `edges`, row after row, shape (columns x (size + 1),)."""
         return np.ascontiguousarray(self.edges).reshape(-1)
 
-    def column(self, bins: Sequence[IntArray] | IntArray) -> IntArray:
-        """Return the column for the bins of all variables, each (n,)."""
+    def column_of_parent_bins(self, bins: Sequence[IntArray] | IntArray) -> IntArray:
+        """Return the column index (n,) for the parents' bins, given all variables' bins."""
         result: AnyArray = np.zeros(np.shape(bins[0]), dtype=np.int64)
         for parent, stride in zip(self.parents, self.strides, strict=True):
             result += stride * bins[parent]
@@ -77,9 +77,7 @@ class NetworkNode:
 
 @dataclass(frozen=True)
 class BayesNetwork:
-    """Nodes by their index in the file's order (of a transition network only what is drawn), and
-    the order in which they can be drawn, parents first.
-    """
+    """Nodes of a Bayesian network in the file's order, and a drawing order with parents first."""
 
     labels: tuple[str, ...]
     sizes: tuple[int, ...]
@@ -94,7 +92,7 @@ def make_network(
     counts: FloatArray,
     drawn: Sequence[int],
 ) -> BayesNetwork:
-    """Return a checked network; arrows are 1 where the row's variable is a parent of the column's.
+    """Return a Bayesian network; NetworkError unless counts and arrows (1: row to column) fit.
 
     Counts (m,) are those of all drawn variables, one behind the other, in the order of `drawn`.
     """
@@ -120,11 +118,11 @@ def make_network(
         nodes[index] = NetworkNode(labels[index], sizes[index], parents, tuple(strides), table)
     if start < len(counts):
         raise NetworkError(f"{len(counts)} counts stand there, {start} are needed")
-    return BayesNetwork(tuple(labels), tuple(sizes), nodes, _order(labels, nodes))
+    return BayesNetwork(tuple(labels), tuple(sizes), nodes, _parents_first_order(labels, nodes))
 
 
-def _order(labels: Sequence[str], nodes: dict[int, NetworkNode]) -> tuple[int, ...]:
-    """Return the nodes with parents first, and otherwise in the file's order."""
+def _parents_first_order(labels: Sequence[str], nodes: dict[int, NetworkNode]) -> tuple[int, ...]:
+    """Return node indices, parents first, else in the file's order; NetworkError for a cycle."""
     left, done = list(nodes), []
     while left:
         ready = next((p for p in left if not any(q in left for q in nodes[p].parents)), None)
@@ -146,23 +144,21 @@ CLIMB, TURN = "\\dot h", "\\dot \\psi"
 
 @dataclass(frozen=True)
 class Bins:
-    """What the bins of a variable stand for: edges (bins + 1,), or None for a category, whose value
-    is the number of its bin, from 1.
-    """
+    """Values of a variable's bins: edges (bins + 1,), or None for a category, counted from 1."""
 
     edges: FloatArray | None
     size: int
 
     @property
     def low(self) -> FloatArray:
-        """Where a value of each bin begins; a bin around zero holds zero and nothing else."""
+        """Lowest value of each bin; 0 for a bin around zero, which stands for zero alone."""
         if self.edges is None:
             return np.arange(1.0, self.size + 1.0)
         return np.where(self._around_zero, 0.0, self.edges[:-1])
 
     @property
     def width(self) -> FloatArray:
-        """Return the width of each bin."""
+        """Width of each bin; 0 for categories and for a bin around zero."""
         if self.edges is None:
             return np.zeros(self.size)
         return np.where(self._around_zero, 0.0, np.diff(self.edges))
@@ -176,7 +172,7 @@ class Bins:
 
 @dataclass(frozen=True)
 class EncounterModel:
-    """A model as its file gives it, with dynamic variables matched by name.
+    """An encounter model: networks of initial values and of transitions, with all bins.
 
     `bins` and `resample_rates_hz` (probability per second of a new value within the same bin) are
     of the initial variables. The transition network is over these (dynamic ones at t) and dynamic
@@ -196,7 +192,7 @@ class EncounterModel:
 
     @property
     def name(self) -> str:
-        """Return the name of the model's file."""
+        """Name of the model's file without its ending."""
         return self.path.stem
 
     @property
@@ -205,10 +201,10 @@ class EncounterModel:
         return self.initial.labels
 
     @property
-    def dynamic(self) -> tuple[int, ...]:
-        """Initial variables that change, in the file's order."""
+    def dynamic_indices(self) -> tuple[int, ...]:
+        """Indices of those initial variables that change over time, ascending."""
         return tuple(sorted(self.targets.values()))
 
     def index_of(self, label: str) -> int | None:
-        """Return which initial variable has this name; None where the model has none."""
+        """Return the index of the initial variable with this label; None if the model has none."""
         return self.labels.index(label) if label in self.labels else None

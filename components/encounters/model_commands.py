@@ -16,14 +16,14 @@ from components.encounters.pair_densities import (
     REFERENCE_FT,
     PairingRules,
     pairing_rules,
-    speeds_over_directions,
+    relative_speed_over_directions,
 )
 from components.encounters.pairing import (
     COURSES,
     PairSampler,
     draw_courses,
+    encounter_set_of_pairs,
     is_pair_accepted,
-    set_of_pairs,
 )
 from components.encounters.sampling import EncounterDraws, SampledTracks, TrackSampler
 from components.encounters.track_rules import TrackError, TrackRules, sample_accepted_tracks
@@ -42,8 +42,8 @@ from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.errors.budgets import describe_long_work
 from dsa_des.files.input_files import InputFileError, is_folder, resolve_home
-from dsa_des.files.output_file import check_ending, check_file, stream_file
-from dsa_des.files.output_names import reason_of, user_path
+from dsa_des.files.output_file import check_file_ending, check_file_writable, stream_file
+from dsa_des.files.output_names import system_error_text, user_path
 from dsa_des.terminal.terminal import say
 
 #: Purpose of the draws: without rejections raw tracks and flown ones are the same.
@@ -62,10 +62,10 @@ def sample_tracks(
     dynamics: str,
     out: str,
 ) -> None:
-    """Write the tracks that the command line asks for."""
+    """Sample tracks of an encounter model and write them as a CSV table."""
     encounter_model = open_model(model)
     path = user_path(out)
-    check_file(path)
+    check_file_writable(path)
     seconds = int(duration_s)
     if seconds != duration_s:
         raise UsageError(
@@ -79,18 +79,18 @@ def sample_tracks(
     if not raw:
         batches = _fly_tracks(encounter_model, seed, range(first, first + count), seconds, dynamics)
     try:
-        rows = _write(path, batches)
+        rows = _write_csv(path, batches)
     except TrackError as error:
         raise UsageError(str(error)) from None
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+        raise OutputError(f"{path}: cannot be written: {system_error_text(error)}") from error
     for note in encounter_model.notes:
         say(f"note: {model}: {note}")
     say(f"{path}: {count} tracks of {seconds} s, {rows} rows")
 
 
 def open_model(text: str) -> EncounterModel:
-    """Return the model in a file that a user named."""
+    """Return the encounter model of a file named by a user; UsageError if it cannot be used."""
     try:
         return read_model(resolve_home(text))
     except ModelFileError as error:
@@ -105,22 +105,22 @@ _Columns = dict[str, AnyArray]
 def _sample_raw(
     model: EncounterModel, seed: int, numbers: range, seconds: int
 ) -> Iterator[_Columns]:
-    """Yield columns as sampled by the network, before any rejection."""
+    """Yield batches of columns with every track's sampled variables, before any rejection."""
     sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
     for tracks in sampler.batches(numbers, seconds):
-        yield _variables(model, tracks, seconds)
+        yield _track_columns(model, tracks, seconds)
 
 
-def _variables(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _Columns:
-    """Return track, time and all variables, track after track."""
+def _track_columns(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _Columns:
+    """Return columns of number, time and all variables, one row per second, track after track."""
     instants = seconds + 1
     columns: _Columns = {
         "track": np.repeat(tracks.numbers, instants),
         "t_s": np.tile(np.arange(instants), len(tracks.numbers)),
     }
     for index, label in enumerate(model.labels):
-        if index in model.dynamic:
-            values = tracks.changing[:, model.dynamic.index(index)].T.reshape(-1)
+        if index in model.dynamic_indices:
+            values = tracks.changing[:, model.dynamic_indices.index(index)].T.reshape(-1)
         else:
             values = np.repeat(tracks.initial[index], instants)
         if model.bins[index].edges is None:
@@ -132,12 +132,12 @@ def _variables(model: EncounterModel, tracks: SampledTracks, seconds: int) -> _C
 def _fly_tracks(
     model: EncounterModel, seed: int, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[_Columns]:
-    """Yield accepted tracks with the positions that they fly through, once per second."""
+    """Yield batches of accepted tracks as columns: variables, positions and motion each second."""
     sampler = TrackSampler(model, EncounterDraws(seed, TRACKS))
     rules = TrackRules(model)
     for tracks, flown in sample_accepted_tracks(sampler, rules, numbers, seconds, dynamics):
         each = round(1.0 / flown.step_s)
-        columns = _variables(model, tracks, seconds)
+        columns = _track_columns(model, tracks, seconds)
         for name, values in (
             ("north_ft", flown.north_ft),
             ("east_ft", flown.east_ft),
@@ -150,8 +150,8 @@ def _fly_tracks(
         yield columns
 
 
-def _write(path: Path, batches: Iterator[_Columns]) -> int:
-    """Write batches as one CSV table; return how many rows it has."""
+def _write_csv(path: Path, batches: Iterator[_Columns]) -> int:
+    """Write batches of columns as one CSV table and return its number of rows."""
     import pyarrow as pa
     import pyarrow.csv as pa_csv
 
@@ -186,7 +186,7 @@ def generate_set(
     vertical: tuple[str, str] | None,
     out: str,
 ) -> None:
-    """Write a set of paired encounters, or of those that a table describes."""
+    """Write a set of encounters from models, recorded flights or a table made by hand."""
     check_origin(at)
     if made is not None:
         if any(one is not None for one in (tracks, model, intruder_model, count)):
@@ -200,7 +200,9 @@ def generate_set(
     if tracks is not None and (model is not None or intruder_model is not None):
         raise UsageError("--tracks are flown by both aircraft: no --model with them")
     if tracks is not None and count is not None:
-        _write_pairs(tracks, range(first, first + count), seed, at, horizontal, vertical, out)
+        _write_recorded_pairs(
+            tracks, range(first, first + count), seed, at, horizontal, vertical, out
+        )
         return
     if model is None or count is None:
         raise UsageError(
@@ -210,25 +212,25 @@ def generate_set(
     own = open_model(model)
     intruder = own if intruder_model is None else open_model(intruder_model)
     path = user_path(out)
-    check_ending(path, [SET])
-    check_file(path)
-    rules = _rules(horizontal, vertical)
+    check_file_ending(path, [SET])
+    check_file_writable(path)
+    rules = _parse_pairing_rules(horizontal, vertical)
     if long := describe_long_work(f"--count {count}", count, *_PAIR):
         say(f"note: {long}", err=True)
     about = {"models": [own.name, intruder.name], "seed": seed, "made_by": "uncorrelated pairing"}
     total, squares, attempts = 0.0, 0.0, 0
 
-    def parts(pairing: PairSampler) -> Iterator[EncounterSet]:
+    def sets_of_batches(pairing: PairSampler) -> Iterator[EncounterSet]:
         nonlocal total, squares, attempts
         for pairs in pairing.batches(range(first, first + count)):
             total += math.fsum(pairs.weight)
             squares += math.fsum(pairs.weight**2)
             attempts += int(np.sum(pairs.attempts + 1))
-            yield set_of_pairs(pairs, rules.closest_s, at, str(path))
+            yield encounter_set_of_pairs(pairs, rules.closest_s, at, str(path))
 
     try:
         pairing = PairSampler(own, intruder, seed, rules)
-        write_set(path, about, parts(pairing))
+        write_set(path, about, sets_of_batches(pairing))
     except TrackError as error:
         raise UsageError(str(error)) from None
     for file, notes in {one.path: one.notes for one in (own, intruder)}.items():
@@ -243,7 +245,7 @@ _MOST_TRIES = 10_000
 _OF_TRACKS = "pairs of tracks"
 
 
-def _write_pairs(
+def _write_recorded_pairs(
     folder: str,
     numbers: range,
     seed: int,
@@ -252,11 +254,11 @@ def _write_pairs(
     vertical: tuple[str, str] | None,
     out: str,
 ) -> None:
-    """Write a set of pairs of recorded flights."""
+    """Write a set of encounters, each a pair of recorded flights moved to meet."""
     path = user_path(out)
-    check_ending(path, [SET])
-    check_file(path)
-    rules = _rules(horizontal, vertical)
+    check_file_ending(path, [SET])
+    check_file_writable(path)
+    rules = _parse_pairing_rules(horizontal, vertical)
     try:
         place = resolve_home(folder)
         if not is_folder(place):
@@ -274,7 +276,7 @@ def _write_pairs(
             f"{rules.duration_s} s without a gap: two at least must be"
         )
     draws = EncounterDraws(seed, _OF_TRACKS)
-    made = [_pair(windows, draws, rules, number) for number in numbers]
+    made = [_pair_recorded_flights(windows, draws, rules, number) for number in numbers]
     times_s = np.arange(rules.duration_s + 1.0)
     pairs = [
         [(name, (times_s, *one)) for name, one in zip(NAMES, both, strict=True)]
@@ -293,17 +295,19 @@ def _write_pairs(
     )
 
 
-def _pair(
+def _pair_recorded_flights(
     windows: TrackWindows, draws: EncounterDraws, rules: PairingRules, number: int
 ) -> tuple[float, tuple[FloatArray, FloatArray], int]:
-    """Return the weight and the paths (m) of one pair, and how many proposals it took."""
+    """Return the weight of one pair of recorded flights, the paths of both (m), and the number of
+    proposals until it was accepted.
+    """
     who = np.array([number])
     for attempt in range(_MOST_TRIES):
         drawn = draws.uniform(who, 4 + 2 * COURSES, attempt)
         (first, own), (second, other) = (
             windows.draw_window(float(share[0])) for share in drawn[:2]
         )
-        speeds = [windows.velocity(path) for path in (own, other)]
+        speeds = [windows.velocity_at_closest(path) for path in (own, other)]
         if first == second or not all(map(is_flying, speeds)):
             continue
         level = [np.array([np.hypot(v[0], v[1])]) / FOOT_M for v in speeds]
@@ -325,15 +329,21 @@ def _pair(
         if is_pair_accepted(rules, list(paths_ft), miss_ft, up_ft)[0]:
             q = density.value_at(miss_ft) / density.area
             chance = accept.value_at(up_ft) / accept.heights.max()
-            weight = speeds_over_directions(level[0], level[1], climb) / (2.0 * REFERENCE_FT)
+            weight = relative_speed_over_directions(level[0], level[1], climb) / (
+                2.0 * REFERENCE_FT
+            )
             return float((weight / q / chance)[0]), (own, other), attempt + 1
     raise UsageError(
         f"pair {number} was rejected {_MOST_TRIES} times: the flights do not meet as the rules ask"
     )
 
 
-def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None) -> PairingRules:
-    """Return the densities of miss distances that a command line asks for."""
+def _parse_pairing_rules(
+    horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None
+) -> PairingRules:
+    """Return the pairing rules with the miss distances that the command line gives; UsageError if
+    they do not fit.
+    """
     steps = []
     for option, given in (("--horizontal", horizontal), ("--vertical", vertical)):
         try:
@@ -354,8 +364,8 @@ def _rules(horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None)
 def _write_made(made: str, out: str) -> None:
     recipe = read_recipe(made)
     path = user_path(out)
-    check_ending(path, [SET])
-    check_file(path)
+    check_file_ending(path, [SET])
+    check_file_writable(path)
     encounters = make_set(recipe)
     write_set(path, {"made_by": "hand", "seed": recipe.seed}, [encounters])
     say(f"{path}: {len(encounters)} encounters of {recipe.duration_s:g} s")

@@ -24,7 +24,7 @@ from components.encounters.model import (
 )
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean, shown_value
-from dsa_des.files.input_files import InputFileError, cache_reads, read_input_text
+from dsa_des.files.input_files import InputFileError, cache_file_reads, read_input_text
 
 PARTS = (
     "labels_initial", "G_initial", "r_initial", "N_initial",
@@ -50,26 +50,26 @@ class ModelFileError(ValueError):
     """A model file cannot be used; the message names the file, and the part, line or variable."""
 
 
-@cache_reads(8)
+@cache_file_reads(8)
 def read_model(path: Path) -> EncounterModel:
-    """Read and check a model file."""
+    """Return a text file's encounter model; ModelFileError, with part and line, if unusable."""
     try:
         text = read_input_text(path)
     except InputFileError as error:
         raise ModelFileError(f"{path}: {error}") from None
-    return _ModelReader(path, text).model()
+    return _ModelReader(path, text).read_whole_model()
 
 
 class _ModelReader:
     def __init__(self, path: Path, text: str) -> None:
         self.path = path
-        self.parts = self._parts(text)
+        self.parts = self._split_parts(text)
 
-    def fail(self, message: str, line: int | None = None) -> ModelFileError:
+    def make_error(self, message: str, line: int | None = None) -> ModelFileError:
         where = f"{self.path}: " if line is None else f"{self.path}: line {line}: "
         return ModelFileError(where + message)
 
-    def _parts(self, text: str) -> dict[str, tuple[int, _Rows]]:
+    def _split_parts(self, text: str) -> dict[str, tuple[int, _Rows]]:
         parts: dict[str, tuple[int, _Rows]] = {}
         rows: _Rows = []
         for number, line in enumerate(text.split("\n"), start=1):
@@ -78,18 +78,20 @@ class _ModelReader:
                 name = stripped[1:].strip()
                 expected = PARTS[len(parts)] if len(parts) < len(PARTS) else None
                 if name != expected:
-                    raise self.fail(self._explain_part(name, expected, parts), number)
+                    raise self.make_error(self._wrong_part_text(name, expected, parts), number)
                 rows = []
                 parts[name] = number, rows
             elif stripped:
                 if not parts:
-                    raise self.fail(f"the file must begin with the line '# {PARTS[0]}'", number)
+                    raise self.make_error(
+                        f"the file must begin with the line '# {PARTS[0]}'", number
+                    )
                 rows.append((number, stripped))
         if len(parts) < len(PARTS):
-            raise self.fail(f"the file ends before its part '# {PARTS[len(parts)]}'")
+            raise self.make_error(f"the file ends before its part '# {PARTS[len(parts)]}'")
         return parts
 
-    def _explain_part(
+    def _wrong_part_text(
         self, name: str, expected: str | None, parts: dict[str, tuple[int, _Rows]]
     ) -> str:
         if name in parts:
@@ -103,34 +105,36 @@ class _ModelReader:
             )
         return f"the part '{name}' stands where '{expected}' is expected"
 
-    def model(self) -> EncounterModel:
-        labels = self.labels("labels_initial")
-        now = self.labels("labels_transition")
-        sources, targets = self.match(labels, now)
-        sizes = self.sizes("r_initial", labels)
-        initial = self.network("initial", labels, sizes, range(len(labels)))
-        later = self.sizes("r_transition", now)
+    def read_whole_model(self) -> EncounterModel:
+        labels = self.read_labels("labels_initial")
+        now = self.read_labels("labels_transition")
+        sources, targets = self.match_transition_variables(labels, now)
+        sizes = self.read_bin_counts("r_initial", labels)
+        initial = self.read_network("initial", labels, sizes, range(len(labels)))
+        later = self.read_bin_counts("r_transition", now)
         for index, of in [*enumerate(sources), *targets.items()]:
             if of >= 0 and later[index] != sizes[of]:
-                raise self.fail(
+                raise self.make_error(
                     f"r_transition: variable '{now[index]}' has {later[index]} bins, but "
                     f"'{labels[of]}' has {sizes[of]} in r_initial",
                     self.parts["r_transition"][0],
                 )
-        transition = self.network("transition", now, later, sorted(targets))
-        rates = self.rates(labels)
-        notes = self.totals(initial)
-        bins, taken = self.convert_to_usual_units(labels, self.bins(labels, sizes))
+        transition = self.read_network("transition", now, later, sorted(targets))
+        rates = self.read_resample_rates(labels)
+        notes = self.check_count_totals(initial)
+        bins, taken = self.convert_to_usual_units(labels, self.read_bins(labels, sizes))
         return EncounterModel(
             self.path, initial, transition, bins, rates, sources, targets, (*notes, *taken)
         )
 
     # -- variables ---------------------------------------------------------------------------
 
-    def labels(self, part: str) -> tuple[str, ...]:
+    def read_labels(self, part: str) -> tuple[str, ...]:
         start, rows = self.parts[part]
         if len(rows) != 1:
-            raise self.fail(f"{part}: one row of names is needed, there are {len(rows)}", start)
+            raise self.make_error(
+                f"{part}: one row of names is needed, there are {len(rows)}", start
+            )
         number, text = rows[0]
         cells = next(csv.reader([text], skipinitialspace=True))
         names = [re.sub(r"\s+", " ", cell.strip().strip('"')).strip() for cell in cells]
@@ -138,23 +142,25 @@ class _ModelReader:
             names.pop()  # a comma at the end
         names = [_INSTANT.sub(lambda at: f"(t{'+1' if at[1] else ''})", name) for name in names]
         if not all(names) or not names:
-            raise self.fail(f"{part}: a name is empty", number)
+            raise self.make_error(f"{part}: a name is empty", number)
         name, count = Counter(names).most_common(1)[0]
         if count > 1:
-            raise self.fail(f"{part}: the variable '{name}' stands there twice", number)
+            raise self.make_error(f"{part}: the variable '{name}' stands there twice", number)
         return tuple(names)
 
-    def match(
+    def match_transition_variables(
         self, labels: tuple[str, ...], now: tuple[str, ...]
     ) -> tuple[tuple[int, ...], dict[int, int]]:
-        """Return of each transition variable the initial one, and those at t + 1."""
+        """Return for each transition variable the index of its initial variable (-1 at t + 1), and
+        for those at t + 1 the same as a dictionary.
+        """
         number = self.parts["labels_transition"][1][0][0]
         sources, targets = [], {}
         for index, name in enumerate(now):
             later = name.endswith(_NEXT)
             base = name.removesuffix(_NEXT if later else _NOW).strip()
             if base not in labels:
-                raise self.fail(
+                raise self.make_error(
                     f"labels_transition: unknown variable {shown_value(name)}"
                     f"{did_you_mean(base, labels)}",
                     number,
@@ -166,59 +172,61 @@ class _ModelReader:
         # One that does not change, and of which nothing depends, may be left out.
         for index, of in targets.items():
             if f"{labels[of]}{_NOW}" not in now:
-                raise self.fail(
+                raise self.make_error(
                     f"labels_transition: '{now[index]}' needs '{labels[of] + _NOW}' beside it",
                     number,
                 )
         if len(set(sources) - {-1}) + len(targets) != len(now):
-            raise self.fail("labels_transition: a variable stands there twice", number)
+            raise self.make_error("labels_transition: a variable stands there twice", number)
         return tuple(sources), targets
 
     # -- numbers -----------------------------------------------------------------------------
 
-    def numbers(self, part: str, what: str = "numbers") -> FloatArray:
-        """Return all numbers of a part; none may be negative or not finite."""
+    def read_numbers(self, part: str, what: str = "numbers") -> FloatArray:
+        """Return all numbers of a file's part; ModelFileError for one negative or not finite."""
         start, rows = self.parts[part]
         values: list[float] = []
         for number, text in rows:
             words = text.replace(",", " ").split()
             for word in words:
-                value = _number(word)
+                value = _float_or_nan(word)
                 if not (math.isfinite(value) and value >= 0.0):
-                    raise self.fail(f"{part}: {shown_value(word)}: {what} of 0 or more", number)
+                    raise self.make_error(
+                        f"{part}: {shown_value(word)}: {what} of 0 or more", number
+                    )
                 values.append(value)
         if not values:
-            raise self.fail(f"{part}: holds no number: the file is cut short", start)
+            raise self.make_error(f"{part}: holds no number: the file is cut short", start)
         return np.array(values)
 
-    def sizes(self, part: str, labels: tuple[str, ...]) -> tuple[int, ...]:
-        values = self.numbers(part, "must be whole numbers")
+    def read_bin_counts(self, part: str, labels: tuple[str, ...]) -> tuple[int, ...]:
+        values = self.read_numbers(part, "must be whole numbers")
         number = self.parts[part][1][0][0]
         if len(values) != len(labels):
-            raise self.fail(
+            raise self.make_error(
                 f"{part}: {len(labels)} numbers of bins are needed, one for each variable; there "
                 f"are {len(values)}",
                 number,
             )
         for value, label in zip(values.tolist(), labels, strict=True):
             if value != int(value) or not 1 <= value <= _MOST_BINS:
-                raise self.fail(
+                raise self.make_error(
                     f"{part}: variable '{label}' has {value:g} bins: must be a whole number of 1 "
                     "or more",
                     number,
                 )
         return tuple(int(value) for value in values)
 
-    def network(
+    def read_network(
         self, which: str, labels: tuple[str, ...], sizes: tuple[int, ...], drawn: range | list[int]
     ) -> BayesNetwork:
-        arrows = self.arrows(f"G_{which}", labels)
+        arrows = self.read_arrows(f"G_{which}", labels)
         part = f"N_{which}"
-        counts = self.numbers(part, "must be counts")
+        counts = self.read_numbers(part, "must be counts")
         if which == "transition":
             for index in range(len(labels)):
                 if index not in drawn and arrows[:, index].any():
-                    raise self.fail(
+                    raise self.make_error(
                         f"G_transition: variable '{labels[index]}' has parents, but is not drawn: "
                         f"only variables at {_NEXT} are",
                         self.parts["G_transition"][0],
@@ -226,28 +234,28 @@ class _ModelReader:
         try:
             return make_network(labels, sizes, arrows, counts, list(drawn))
         except NetworkError as error:
-            raise self.fail(f"{part}: {error}", self.parts[part][1][0][0]) from None
+            raise self.make_error(f"{part}: {error}", self.parts[part][1][0][0]) from None
 
-    def arrows(self, part: str, labels: tuple[str, ...]) -> IntArray:
+    def read_arrows(self, part: str, labels: tuple[str, ...]) -> IntArray:
         start, rows = self.parts[part]
         count = len(labels)
         if len(rows) != count:
-            raise self.fail(f"{part}: {count} rows are needed, there are {len(rows)}", start)
+            raise self.make_error(f"{part}: {count} rows are needed, there are {len(rows)}", start)
         arrows = np.zeros((count, count), dtype=np.int64)
         for index, (number, text) in enumerate(rows):
             words = text.replace(",", " ").split()
             if len(words) != count or set(words) - {"0", "1"}:
-                raise self.fail(
+                raise self.make_error(
                     f"{part}: variable '{labels[index]}': {count} values of 0 or 1 are needed",
                     number,
                 )
             arrows[index] = [int(word) for word in words]
         return arrows
 
-    def bins(self, labels: tuple[str, ...], sizes: tuple[int, ...]) -> tuple[Bins, ...]:
+    def read_bins(self, labels: tuple[str, ...], sizes: tuple[int, ...]) -> tuple[Bins, ...]:
         start, rows = self.parts["boundaries"]
         if len(rows) != len(labels):
-            raise self.fail(
+            raise self.make_error(
                 f"boundaries: {len(labels)} rows are needed, one for each variable; there are "
                 f"{len(rows)}",
                 start,
@@ -257,15 +265,15 @@ class _ModelReader:
             if text == "*":
                 bins.append(Bins(None, size))
                 continue
-            edges = np.array([_number(word) for word in text.replace(",", " ").split()])
+            edges = np.array([_float_or_nan(word) for word in text.replace(",", " ").split()])
             if len(edges) != size + 1:
-                raise self.fail(
+                raise self.make_error(
                     f"boundaries: variable '{label}' has {size} bins: {size + 1} edges are needed, "
                     f"or *; there are {len(edges)}",
                     number,
                 )
             if not np.isfinite(edges).all() or (np.diff(edges) <= 0.0).any():
-                raise self.fail(
+                raise self.make_error(
                     f"boundaries: variable '{label}': edges must be rising numbers", number
                 )
             bins.append(Bins(edges, size))
@@ -274,7 +282,7 @@ class _ModelReader:
     def convert_to_usual_units(
         self, labels: tuple[str, ...], bins: tuple[Bins, ...]
     ) -> tuple[tuple[Bins, ...], list[str]]:
-        """Return bins in ft/min and deg/s, and notes on those that must be in other units.
+        """Return bins in ft/min, deg/s, and notes on small values that must be in other units.
 
         A file does not say its units; no aircraft climbs and sinks so little, or turns so slowly.
         """
@@ -294,26 +302,26 @@ class _ModelReader:
             notes.append(f"variable '{SPEED}' reaches {speeds.max():g} kt: is it in ft/s?")
         return tuple(found), notes
 
-    def rates(self, labels: tuple[str, ...]) -> FloatArray:
-        rates = self.numbers("resample_rates", "must be probabilities")
+    def read_resample_rates(self, labels: tuple[str, ...]) -> FloatArray:
+        rates = self.read_numbers("resample_rates", "must be probabilities")
         number = self.parts["resample_rates"][1][0][0]
         if len(rates) != len(labels):
-            raise self.fail(
+            raise self.make_error(
                 f"resample_rates: {len(labels)} are needed, one for each variable; there are "
                 f"{len(rates)}",
                 number,
             )
         for rate, label in zip(rates.tolist(), labels, strict=True):
             if rate > 1.0:
-                raise self.fail(
+                raise self.make_error(
                     f"resample_rates: variable '{label}': {rate:g} must lie in [0, 1]: it is the "
                     "probability per second",
                     number,
                 )
         return rates
 
-    def totals(self, initial: BayesNetwork) -> tuple[str, ...]:
-        """Refuse the one variable whose rows sum to something else than those of all others.
+    def check_count_totals(self, initial: BayesNetwork) -> tuple[str, ...]:
+        """Return a note if variables' counts differ in sum; ModelFileError if only one does.
 
         All nodes are counted over the same cases. A model whose nodes do not agree at all was not
         made by counting; its columns are probabilities all the same.
@@ -324,7 +332,7 @@ class _ModelReader:
             return ()
         odd = [name for name, total in totals.items() if total != common]
         if many >= _MAJORITY and many > len(totals) - 3:
-            raise self.fail(
+            raise self.make_error(
                 f"N_initial: variable '{odd[0]}': its counts sum to {totals[odd[0]]:.15g}, those "
                 f"of the other variables to {common:.15g}",
                 self.parts["N_initial"][1][0][0],
@@ -332,7 +340,7 @@ class _ModelReader:
         return ("the counts of the initial variables sum to different numbers of cases",)
 
 
-def _number(word: str) -> float:
+def _float_or_nan(word: str) -> float:
     try:
         return math.nan if "_" in word else float(word)
     except ValueError:

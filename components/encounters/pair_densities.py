@@ -15,9 +15,7 @@ _NAUTICAL_MILE_FT = 6076.115485564304
 
 @dataclass(frozen=True, eq=False)
 class StepDensity:
-    """A function that is constant between rising edges (n + 1,), with heights (n,) above 0;
-    ValueError where they do not fit.
-    """
+    """A positive function that is constant between rising edges (n + 1,), with heights (n,)."""
 
     edges: FloatArray
     heights: FloatArray
@@ -39,19 +37,19 @@ class StepDensity:
 
     @property
     def area(self) -> float:
-        """Integral over all of it."""
+        """Integral of the function from the first to the last edge."""
         return float(self._cumulative_area[-1])
 
     def integral_to(self, x: FloatArray) -> FloatArray:
-        """Return the integral from the first edge to x."""
+        """Return the integral of the function from the first edge to each x."""
         return np.interp(x, self.edges, self._cumulative_area)
 
     def quantile_of_area(self, area: FloatArray) -> FloatArray:
-        """Return the x up to which the integral is as large."""
+        """Return the x up to which the integral from the first edge has this value."""
         return np.interp(area, self._cumulative_area, self.edges)
 
     def value_at(self, x: FloatArray) -> FloatArray:
-        """Return the value at x; outside the edges that of the nearest step."""
+        """Return the function's value at each x; outside the edges that of the outermost step."""
         index = np.searchsorted(self.edges, x, side="right") - 1
         result: FloatArray = self.heights[np.clip(index, 0, len(self.heights) - 1)]
         return result
@@ -62,14 +60,16 @@ FARTHEST_FT = 1e6
 
 
 def horizontal_density(edges_ft: FloatArray, shares: FloatArray) -> StepDensity:
-    """Return the density of signed horizontal miss distances with these shares between edges."""
+    """Return the density of signed horizontal miss distances (ft) with these shares by edges."""
     wide = np.diff(edges_ft) if len(edges_ft) == len(shares) + 1 else 1.0
     with np.errstate(divide="ignore", invalid="ignore"):  # steps of no width are refused
         return _density_about_zero(edges_ft, shares / wide)
 
 
-def vertical_density(edges_ft: FloatArray, chances: FloatArray) -> StepDensity:
-    """Return the chances with which vertical miss distances between edges are accepted."""
+def vertical_acceptance(edges_ft: FloatArray, chances: FloatArray) -> StepDensity:
+    """Return the probability, by signed vertical miss distance (ft), that an encounter is accepted,
+    constant between edges.
+    """
     if not (chances <= 1.0).all():
         raise ValueError("chances must lie above 0 and be 1 at most")
     return _density_about_zero(edges_ft, chances)
@@ -84,13 +84,13 @@ def _density_about_zero(edges_ft: FloatArray, heights: FloatArray) -> StepDensit
     return density
 
 
-def _steps(edges: list[float], heights: list[float]) -> StepDensity:
+def _step_density(edges: list[float], heights: list[float]) -> StepDensity:
     return StepDensity(np.array(edges), np.array(heights))
 
 
 @dataclass(frozen=True)
 class PairingRules:
-    """How two independent tracks become an encounter.
+    """Rules that make two sampled tracks an encounter: durations, miss distances and limits.
 
     They last `duration_s` and are closest at `closest_s`. A vertical miss distance is accepted with
     a probability in proportion to `vertical_ft`, none outside its edges; the signed horizontal one
@@ -101,12 +101,12 @@ class PairingRules:
     duration_s: int = 180
     closest_s: int = 150
     vertical_ft: StepDensity = field(
-        default_factory=lambda: _steps(
+        default_factory=lambda: _step_density(
             [-1500, -500, -100, 0, 100, 500, 1500], [1 / 2, 1 / 1.5, 1, 1, 1 / 1.5, 1 / 2]
         )
     )
     horizontal_ft: StepDensity = field(
-        default_factory=lambda: _steps(
+        default_factory=lambda: _step_density(
             [-18240, -1500, -500, 0, 500, 1500, 18240],
             [1 / 1.5 / 16740, 1 / 1.25 / 1000, 1 / 500, 1 / 500, 1 / 1.25 / 1000, 1 / 1.5 / 16740],
         )
@@ -125,7 +125,7 @@ class PairingRules:
 
 
 class MissDistances(Parameters):
-    """How often encounters of a model pass at which distance; their weights undo it."""
+    """Edges and proportions of encounters' miss distances, which the weights undo."""
 
     edges_ft: tuple[float, ...] = Field(description="Rising edges of steps, ft.")
     proportions: tuple[float, ...] = Field(
@@ -134,18 +134,18 @@ class MissDistances(Parameters):
     )
 
     @property
-    def steps(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """Edges and proportions."""
+    def edges_and_proportions(self) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Edges in ft, and proportions of the steps between them."""
         return self.edges_ft, self.proportions
 
 
 def pairing_rules(*steps: Sequence[Sequence[float]] | None) -> PairingRules:
-    """Return rules with edges (ft) and proportions of horizontal and of vertical distances, if any.
+    """Return the standard rules, with other steps of horizontal and vertical miss if given.
 
     ValueError begins with which of both does not fit.
     """
     changes: dict[str, Any] = {}
-    makers = {"horizontal": horizontal_density, "vertical": vertical_density}
+    makers = {"horizontal": horizontal_density, "vertical": vertical_acceptance}
     for (name, make), given in zip(makers.items(), steps, strict=True):
         try:
             if given is not None:
@@ -159,8 +159,10 @@ def pairing_rules(*steps: Sequence[Sequence[float]] | None) -> PairingRules:
 REFERENCE_FT = 60761.0
 
 
-def speeds_over_directions(first: FloatArray, second: FloatArray, climb: FloatArray) -> FloatArray:
-    """Return the relative speed integrated over all directions of one velocity against the other.
+def relative_speed_over_directions(
+    first: FloatArray, second: FloatArray, climb: FloatArray
+) -> FloatArray:
+    """Return the integral of two aircraft's relative speed over course differences 0 to 2 pi.
 
     ∫ √(v₁² + v₂² - 2 v₁ v₂ cos ψ + Δḣ²) dψ over a full turn is 4 √A E(m) with A = (v₁ + v₂)² + Δḣ²
     and m = 4 v₁ v₂ / A, E the complete elliptic integral of the second kind of the *parameter* m.

@@ -25,7 +25,11 @@ import numpy as np
 
 from components.arguments.units import FOOT_M
 from components.encounters.model import EncounterModel
-from components.encounters.pair_densities import REFERENCE_FT, PairingRules, speeds_over_directions
+from components.encounters.pair_densities import (
+    REFERENCE_FT,
+    PairingRules,
+    relative_speed_over_directions,
+)
 from components.encounters.sampling import EncounterDraws, Ints, TrackSampler
 from components.encounters.track_rules import Commands, TrackError, TrackRules
 from components.flights.point_mass import cumulative_sums, fly_euler
@@ -44,7 +48,7 @@ _PATHS = ("north_ft", "east_ft", "up_ft", "heading_rad", "speed_ft_s")
 
 @dataclass(frozen=True)
 class Pairs:
-    """Encounters (pairs,); arrays of both aircraft (2, seconds + 1, pairs) have the ownship first.
+    """Sampled encounters (pairs,); arrays (2, seconds + 1, pairs) have the ownship first.
 
     Miss distances are those at the closest approach, signed, and intruder above ownship;
     `course_rad` is the intruder's then, when the ownship's is 0, and the origin where the ownship
@@ -68,7 +72,7 @@ class Pairs:
     acceleration_ft_s2: FloatArray
 
     def take(self, rows: IntArray) -> "Pairs":
-        """Return some of them, in this order."""
+        """Return the pairs with these indices, in this order."""
         return Pairs(**{name: values.take(rows, axis=-1) for name, values in vars(self).items()})
 
     def at_start(self) -> "Pairs":
@@ -78,7 +82,7 @@ class Pairs:
 
 
 class PairSampler:
-    """Makes encounters of two models by their numbers."""
+    """Samples encounters of two models by number; the same number gives the same encounter."""
 
     def __init__(
         self, own: EncounterModel, intruder: EncounterModel, seed: int, rules: PairingRules
@@ -92,12 +96,12 @@ class PairSampler:
         self._draws = EncounterDraws(seed, "pairs")
 
     def batches(self, numbers: range) -> Iterator[Pairs]:
-        """Yield pairs in order of their numbers, at their start, in batches that fit in memory."""
+        """Yield a range's pairs in batches that fit in memory, with positions at time 0 only."""
         for start in range(0, len(numbers), PAIRS_AT_ONCE):
-            yield self.pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
+            yield self.sample_pairs(numbers[start : start + PAIRS_AT_ONCE], paths=False)
 
-    def pairs(self, numbers: Ints, *, paths: bool = True) -> Pairs:
-        """Return the pairs with these numbers, which rise."""
+    def sample_pairs(self, numbers: Ints, *, paths: bool = True) -> Pairs:
+        """Return accepted pairs by ascending numbers, with whole paths or positions at time 0."""
         wanted = np.asarray(numbers, dtype=np.int64)
         parts: list[Pairs] = []
         left, attempt = np.arange(len(wanted)), np.zeros(len(wanted), dtype=np.int64)
@@ -108,11 +112,11 @@ class PairSampler:
             many = min(_MOST_AT_ONCE, max(1, round(each / max(passed, 0.02))))
             rows = np.repeat(left, many)
             tries = np.repeat(attempt[left], many) + np.tile(np.arange(many), len(left))
-            hopeful, narrow, bound = self._starts(wanted[rows], tries)
+            hopeful, narrow, bound = self._hopeful_proposals(wanted[rows], tries)
             passed = len(hopeful) / len(rows)
             rows, tries = rows[hopeful], tries[hopeful]
             attempt[left] += many
-            done, kept, pairs = self._flights(wanted[rows], tries, narrow, bound)
+            done, kept, pairs = self._accepted_proposals(wanted[rows], tries, narrow, bound)
             if pairs is not None:
                 # Of several that are accepted the first attempt counts.
                 fresh, first = np.unique(rows[done], return_index=True)
@@ -127,8 +131,10 @@ class PairSampler:
         together = _concatenate(parts)
         return together.take(np.argsort(together.numbers))
 
-    def _starts(self, numbers: IntArray, attempts: IntArray) -> tuple[IntArray, AnyArray, AnyArray]:
-        """Return which proposals may be accepted by their first second alone.
+    def _hopeful_proposals(
+        self, numbers: IntArray, attempts: IntArray
+    ) -> tuple[IntArray, AnyArray, AnyArray]:
+        """Return the indices of proposals whose first second does not already rule them out.
 
         With them go which aircraft's layer is the narrower one, whose altitude is kept, and the
         chance with which they were let through.
@@ -137,38 +143,42 @@ class PairSampler:
         good: BoolArray = np.ones(len(numbers), dtype=np.bool_)
         for rules, tracks in zip(self._rules, both, strict=True):
             commands = rules.commands(tracks)
-            good &= rules.flies(tracks, commands.climb_ft_s, commands.speed_ft_s[np.newaxis])
-        layers = np.array([r.layers_ft(t) for r, t in zip(self._rules, both, strict=True)])
+            good &= rules.keeps_limits(tracks, commands.climb_ft_s, commands.speed_ft_s[np.newaxis])
+        layers = np.array([r.layer_edges_ft(t) for r, t in zip(self._rules, both, strict=True)])
         width = layers[:, 1] - layers[:, 0]
         narrow = (width[1] < width[0]).astype(np.int64)
         here = np.arange(len(numbers))
-        altitudes = np.array([r.altitude_ft(t) for r, t in zip(self._rules, both, strict=True)])
+        altitudes = np.array(
+            [r.initial_altitude_ft(t) for r, t in zip(self._rules, both, strict=True)]
+        )
         kept = altitudes[narrow, here]
-        most = sum(r.steepest_ft_s(t) for r, t in zip(self._rules, both, strict=True))
+        most = sum(r.steepest_climb_ft_s(t) for r, t in zip(self._rules, both, strict=True))
         climbs = most * self.rules.closest_s
         low, high = (layers[1 - narrow, k, here] - kept for k in (0, 1))
         reach = np.abs(self.rules.vertical_ft.edges[[0, -1]]).max()
         good &= (low - climbs < reach) & (high + climbs > -reach)
         accept = self.rules.vertical_ft
         bound = np.minimum(1.0, accept.area / accept.heights.max() / width[1 - narrow, here])
-        drawn = self._draws.uniform_of_few(numbers, 1, attempts)[0]
+        drawn = self._draws.uniform_fast(numbers, 1, attempts)[0]
         hopeful = np.flatnonzero(good & (drawn < bound))
         return hopeful, narrow[hopeful], bound[hopeful]
 
-    def _flights(
+    def _accepted_proposals(
         self, numbers: IntArray, attempts: IntArray, narrow: IntArray, bound: FloatArray
     ) -> tuple[IntArray, IntArray, Pairs | None]:
-        """Return which proposals are accepted, and which of some pairs they are."""
+        """Return the indices of accepted proposals, their rows among the returned pairs, and these
+        pairs, None without any.
+        """
         if not len(numbers):
             return numbers, numbers, None
         rules, cpa = self.rules, self.rules.closest_s
         # Whoever breaks a rule alone is not flown with the other.
-        own = self._flight(0, numbers, attempts)
+        own = self._sample_flight(0, numbers, attempts)
         rows = own.flies.nonzero()[0]
         own, narrow, bound = own.take(rows), narrow[rows], bound[rows]
-        other = self._flight(1, numbers[rows], attempts[rows])
+        other = self._sample_flight(1, numbers[rows], attempts[rows])
         both = own, other
-        drawn = self._draws.uniform_of_few(numbers[rows], _COURSES_FROM, attempts[rows])
+        drawn = self._draws.uniform_fast(numbers[rows], _COURSES_FROM, attempts[rows])
         here = np.arange(len(rows))
         climbed = np.array([f.commands.climb_ft_s[:cpa].sum(axis=0) for f in both])
         altitude = np.array([f.commands.altitude_ft for f in both])
@@ -190,28 +200,28 @@ class PairSampler:
         done = good.nonzero()[0]
         for k, flight in enumerate(both):
             climb = flight.commands.climb_ft_s[:, done]
-            done = done[self._rules[k].is_inside(cumulative_sums(altitude[k, done], climb))]
+            done = done[
+                self._rules[k].is_within_altitudes(cumulative_sums(altitude[k, done], climb))
+            ]
         if not len(done):
             return done, done, None
         commands = [f.commands.take(done) for f in both]
         for k, c in enumerate(commands):
             c.altitude_ft[:] = altitude[k, done]
         rows = rows[done]
-        more = self._draws.uniform_of_few(
-            numbers[rows], _COURSES_FROM + 2 * COURSES, attempts[rows]
-        )
+        more = self._draws.uniform_fast(numbers[rows], _COURSES_FROM + 2 * COURSES, attempts[rows])
         pairs = self._fly_pairs(numbers[rows], attempts[rows], commands, vertical[done], more[3:])
         kept = self._is_accepted(pairs).nonzero()[0]
         return rows[kept], kept, pairs
 
-    def _flight(self, which: int, numbers: IntArray, attempts: IntArray) -> "_Flight":
-        """Return the commands of tracks of one aircraft, and which keep their own rules."""
+    def _sample_flight(self, which: int, numbers: IntArray, attempts: IntArray) -> "_Flight":
+        """Return one aircraft's commands of sampled tracks, and which keep the model's limits."""
         rules = self._rules[which]
         tracks = self._tracks[which].sample(numbers, self.rules.duration_s, attempts)
         commands = rules.commands(tracks)
         speed = cumulative_sums(commands.speed_ft_s, commands.acceleration_ft_s2)
-        good = rules.flies(tracks, commands.climb_ft_s, speed)
-        return _Flight(commands, good, *rules.layers_ft(tracks))
+        good = rules.keeps_limits(tracks, commands.climb_ft_s, speed)
+        return _Flight(commands, good, *rules.layer_edges_ft(tracks))
 
     def _fly_pairs(
         self,
@@ -221,7 +231,7 @@ class PairSampler:
         vertical: FloatArray,
         drawn: FloatArray,
     ) -> Pairs:
-        """Fly both tracks through their positions at the closest approach."""
+        """Return pairs of tracks, flown and moved to their drawn positions at closest approach."""
         cpa = self.rules.closest_s
         flown = [
             fly_euler(c.altitude_ft, c.speed_ft_s, c.acceleration_ft_s2, c.climb_ft_s, c.turn_rad_s)
@@ -250,7 +260,9 @@ class PairSampler:
         accept = self.rules.vertical_ft
         chance = accept.value_at(vertical) / accept.heights.max()
         q = density.value_at(horizontal) / density.area
-        weight = speeds_over_directions(first, second, climb) / (2.0 * REFERENCE_FT) / q / chance
+        weight = (
+            relative_speed_over_directions(first, second, climb) / (2.0 * REFERENCE_FT) / q / chance
+        )
         return Pairs(
             numbers, weight, horizontal, vertical, course, attempts,
             np.array(norths), np.array(easts), np.array([f.up_ft for f in flown]),
@@ -272,7 +284,7 @@ def is_pair_accepted(
     horizontal_ft: FloatArray,
     vertical_ft: FloatArray,
 ) -> BoolArray:
-    """Return which pairs begin far enough from each other, and are closest when they should.
+    """Return which pairs start far enough apart and are closest at the wanted time and miss.
 
     Paths are north, east and up, each (2, seconds + 1, pairs).
     """
@@ -294,7 +306,7 @@ def is_pair_accepted(
 
 @dataclass(frozen=True)
 class _Flight:
-    """Tracks of one aircraft that are not paired yet."""
+    """One aircraft's commands of sampled tracks, not yet paired, and its altitude layers' edges."""
 
     commands: Commands
     flies: BoolArray
@@ -314,7 +326,7 @@ def _concatenate(parts: list[Pairs]) -> Pairs:
 def draw_courses(
     first: FloatArray, second: FloatArray, climb: FloatArray, drawn: FloatArray
 ) -> FloatArray:
-    """Return courses with a density proportional to the relative speed, by rejection.
+    """Return the intruder's course, rad, drawn by rejection in proportion to the relative speed.
 
     At least 64 in 100 uniform courses are accepted, so of as many as are drawn one always is.
     """
@@ -332,10 +344,10 @@ def draw_courses(
     return result
 
 
-def set_of_pairs(
+def encounter_set_of_pairs(
     pairs: Pairs, closest_s: int, reference_deg: tuple[float, float], source: str
 ) -> EncounterSet:
-    """Return a set with one encounter per pair."""
+    """Return an encounter set of pairs: initial states, and events where commands change."""
     count = len(pairs.numbers)
     commands = np.stack([pairs.climb_ft_s, pairs.turn_rad_s, pairs.acceleration_ft_s2])
     # (quantity, pair, aircraft, second): rows of the file in their order.
@@ -348,7 +360,7 @@ def set_of_pairs(
     starts = np.concatenate([[0], np.cumsum(changed.reshape(2 * count, -1).sum(axis=1))])
     climb, turn, acceleration = (values[changed] for values in commands)
 
-    def both(values: FloatArray) -> FloatArray:
+    def initial_values(values: FloatArray) -> FloatArray:
         return np.ascontiguousarray(values[:, 0].T).reshape(-1)
 
     course = np.degrees(pairs.course_rad) % 360.0
@@ -363,11 +375,11 @@ def set_of_pairs(
         2 * np.arange(count + 1),
         NAMES * count,
         {
-            "north_m": both(pairs.north_ft) * FOOT_M,
-            "east_m": both(pairs.east_ft) * FOOT_M,
-            "altitude_m": both(pairs.up_ft) * FOOT_M,
-            "speed_mps": both(pairs.speed_ft_s) * FOOT_M,
-            "heading_rad": both(pairs.heading_rad),
+            "north_m": initial_values(pairs.north_ft) * FOOT_M,
+            "east_m": initial_values(pairs.east_ft) * FOOT_M,
+            "altitude_m": initial_values(pairs.up_ft) * FOOT_M,
+            "speed_mps": initial_values(pairs.speed_ft_s) * FOOT_M,
+            "heading_rad": initial_values(pairs.heading_rad),
             "duration_s": np.full(2 * count, float(seconds)),
         },
         starts,

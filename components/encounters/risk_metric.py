@@ -14,11 +14,15 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import Encounter, ModelTraffic, SetTraffic
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class, pair_paths
-from components.metrics.losses import meeting_deg, nominal_geometry
+from components.metrics.losses import course_and_bearing_deg, nominal_geometry
 from components.metrics.risk import Mitigated, RiskParameters
 from components.metrics.separation import traffic_block
-from components.well_clear.missed_cylinder import Missed, probability_led_into, widen_cylinders
-from components.well_clear.plane_pairs import Meetings, meetings
+from components.well_clear.missed_cylinder import (
+    Missed,
+    probability_of_induced_entry,
+    widen_cylinders,
+)
+from components.well_clear.plane_pairs import Meetings, closest_meetings
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.scene import Scene
@@ -37,12 +41,12 @@ from dsa_des.studies.metric import (
 
 
 def has_weights(scene: Scene) -> bool:
-    """Return whether the traffic of a scene is one encounter of many, each with its weight."""
+    """Return whether a scene's traffic is chosen from weighted encounters."""
     return hasattr(traffic_block(scene).parameters, "encounter")
 
 
-def encounters_of(group: Group) -> list[Encounter]:
-    """Return the encounter of every replica, its set and its index there, made together."""
+def encounters_of_replicas(group: Group) -> list[Encounter]:
+    """Return for each replica the set of its encounter and the index there."""
     block = traffic_block(group.scene)
     cls: Any = block.cls
     return group.cached("encounters", lambda: cls.choose(group.parameters_of(block.name)))
@@ -61,7 +65,7 @@ class EncounterWeight(Metric):
             )
 
     def results(self) -> list[Result]:
-        """Return number, weight and family."""
+        """Return what this metric gives per run: number, weight and family of its encounter."""
         return [
             Result("encounter", KEY, "number of the encounter"),
             Result("encounter_weight", NUMBER, "how often it happens in the airspace"),
@@ -69,9 +73,9 @@ class EncounterWeight(Metric):
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all three for every replica."""
+        """Return number, weight and family of the encounter of every replica, by name."""
         numbers, weights, families = np.empty((3, len(group)))
-        for row, (encounter_set, index) in enumerate(encounters_of(group)):
+        for row, (encounter_set, index) in enumerate(encounters_of_replicas(group)):
             numbers[row], weights[row] = encounter_set.numbers[index], encounter_set.weights[index]
             families[row] = encounter_set.extra.get(FAMILY, encounter_set.numbers)[index]
         return {
@@ -79,7 +83,7 @@ class EncounterWeight(Metric):
         }  # fmt: skip
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all three, which no flight changes."""
+        """Return the same three results, known before any flight."""
         return self.measure(group)
 
 
@@ -102,7 +106,7 @@ _WIDE_DEG = 35.0
 
 
 class RiskRatioParameters(RiskParameters):
-    """What counts as an event, and of which classes of geometry there are ratios."""
+    """Which events are counted, and for which classes of geometry there are separate ratios."""
 
     by: tuple[Literal["geometry", "bearing"], ...] = Field(
         default=("geometry",),
@@ -118,7 +122,7 @@ class RiskRatioParameters(RiskParameters):
 
 
 class RiskRatios(Mitigated):
-    """Risk ratios of NMAC and of loss of well clear, with the flags that they are made of."""
+    """Risk ratios of NMAC and of loss of well clear, and the runs' event flags behind them."""
 
     Parameters: ClassVar[Any] = RiskRatioParameters
     of_any_two = False
@@ -135,7 +139,7 @@ class RiskRatios(Mitigated):
         self._climbs = any(map(may_climb, (scene.blocks[name] for name in self.delays_s)))
 
     def results(self) -> list[Result]:
-        """Return flags, encounter and weight, classes, and the ratios of all and of each class."""
+        """Return event flags, encounter and weight, classes, and ratios overall and by class."""
         result = super().results()
         weight = cluster = None
         if self._weight is not None:
@@ -167,41 +171,45 @@ class RiskRatios(Mitigated):
         return result
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all but the ratios for every replica."""
+        """Return, by name, everything but the ratios for every replica."""
         result = dict(super().measure(group))
         result |= self._weights_and_classes(group, result)
         if self.p.needless:
             commanded = np.zeros(len(group))
-            commanded[list(self.manoeuvres(group))] = 1.0
+            commanded[list(self.viewer_manoeuvres(group))] = 1.0
             result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
         return result
 
     def unit_weights(self, group: Group) -> FloatArray:
-        """Return the weights of the encounters."""
+        """Return the weight of each replica's encounter; the base class's where it has none."""
         if self._weight is None:
             return super().unit_weights(group)
         weights: FloatArray = self._weight.measure(group)["encounter_weight"]
         return weights
 
-    def nominal(self, group: Group) -> dict[str, AnyArray]:
-        """Return both events without manoeuvres; flights tell where the plane is not sure."""
+    def nominal_event_flags(self, group: Group) -> dict[str, AnyArray]:
+        """Return both events' flags unmanoeuvred, from straight paths if enough, else flights."""
         meeting = meetings_in_plane(group, self.p)
         if meeting is None:
-            return super().nominal(group)
-        result = _events_of(meeting)
+            return super().nominal_event_flags(group)
+        result = _nominal_event_flags(meeting)
         unsure = np.flatnonzero(meeting.unsure.any(axis=0))
         if len(unsure):
-            for name, column in self.losses(group, steered=False, some=unsure).items():
+            for name, column in self.event_flags(group, steered=False, some=unsure).items():
                 result[f"{name}_nominal"][unsure] = column
         return result
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the results that no manoeuvre changes, and the closest approach's geometry."""
+        """Return, by name, results that no manoeuvre changes, geometry of the closest approach, and
+        guesses of the others.
+        """
         meeting, sizes_m = meetings_in_plane(group, self.p), self.p.sizes_m
         if meeting is None:
             result = self._nominal_events(group)
             geometry = partial(nominal_geometry, widen_cylinders(sizes_m))
-            closest, *misses_m = np.split(self.read_flights(group, geometry, steered=False), [7, 9])
+            closest, *misses_m = np.split(
+                self.evaluate_flights(group, geometry, steered=False), [7, 9]
+            )
         else:
             closest, result = meeting.closest, self._meeting_events(meeting)
             misses_m = [meeting.beside_m, meeting.above_m]
@@ -230,7 +238,9 @@ class RiskRatios(Mitigated):
             there = result[f"{event}_nominal"] > 0.0
             missed = Missed(values[1], values[2], misses_m[0][k], misses_m[1][k])
             induced = (
-                _INDUCED * rushed * probability_led_into(sizes_m[k], missed, climbs=self._climbs)
+                _INDUCED
+                * rushed
+                * probability_of_induced_entry(sizes_m[k], missed, climbs=self._climbs)
             )
             stays = _STAYS + (1.0 - _STAYS) * late
             result[expected_column(f"{event}_mitigated")] = np.where(there, stays, induced)
@@ -239,15 +249,15 @@ class RiskRatios(Mitigated):
         return result
 
     def _nominal_events(self, group: Group) -> dict[str, AnyArray]:
-        """Return events and classes of flights without manoeuvres."""
-        return {**super().nominal(group), **self._classes(group)}
+        """Return event flags and geometry classes of the replicas, flown without manoeuvres."""
+        return {**super().nominal_event_flags(group), **self._nominal_classes(group)}
 
     def _meeting_events(self, meeting: Meetings) -> dict[str, AnyArray]:
-        """Return events and classes by straight paths in the plane, where these decide."""
-        return _events_of(meeting) | self._class_columns(*meeting.closest[5:])
+        """Return event flags and geometry classes computed from straight paths in the plane."""
+        return _nominal_event_flags(meeting) | self._class_columns(*meeting.closest[5:])
 
     def _is_class_unsure(self, meeting: Meetings) -> BoolArray:
-        """Return of which runs the plane does not tell the classes."""
+        """Return which runs' geometry class the straight paths in the plane leave open (mask)."""
         if not self.p.by:
             return np.zeros_like(meeting.unsure_angles)
         low, high = meeting.angles_deg[:, 0], meeting.angles_deg[:, 1]
@@ -257,19 +267,21 @@ class RiskRatios(Mitigated):
             unsure |= one != other
         return unsure
 
-    def _classes(self, group: Group) -> dict[str, AnyArray]:
-        """Return the classes of encounters, as without manoeuvres."""
+    def _nominal_classes(self, group: Group) -> dict[str, AnyArray]:
+        """Return the replicas' geometry classes, flown without manoeuvres; empty if not asked."""
         if not self.p.by:
             return {}
-        return self._class_columns(*self.read_flights(group, meeting_deg, steered=False))
+        return self._class_columns(
+            *self.evaluate_flights(group, course_and_bearing_deg, steered=False)
+        )
 
     def _class_columns(
         self, course_deg: FloatArray, bearing_deg: FloatArray
     ) -> dict[str, AnyArray]:
-        """Return the classes by courses and bearings; None where nobody is met."""
+        """Return the classes by relative course and bearing, deg; None where no aircraft is met."""
         result: dict[str, AnyArray] = {}
         for by in self.p.by:
-            named = geometry_class(course_deg) if by == "geometry" else side_of(bearing_deg)
+            named = geometry_class(course_deg) if by == "geometry" else bearing_sector(bearing_deg)
             column: AnyArray = named.astype(object)
             column[np.isnan(course_deg)] = None
             result[f"encounter_{by}"] = column
@@ -278,16 +290,16 @@ class RiskRatios(Mitigated):
     def _weights_and_classes(
         self, group: Group, known: Mapping[str, AnyArray]
     ) -> dict[str, AnyArray]:
-        """Return weight and classes, and whether well clear is kept, as without manoeuvres."""
+        """Return replicas' weights and classes, and if they stay well clear without manoeuvres."""
         result: dict[str, AnyArray] = {}
         if self.p.needless:
             result[_KEPT] = 1.0 - known["well_clear_lost_nominal"]
         if self._weight is not None:
             result |= self._weight.measure(group)
-        return result | self._classes(group)
+        return result | self._nominal_classes(group)
 
 
-def _events_of(meeting: Meetings) -> dict[str, AnyArray]:
+def _nominal_event_flags(meeting: Meetings) -> dict[str, AnyArray]:
     return {
         f"{name}_nominal": inside.astype(float)
         for name, inside in zip(("well_clear_lost", "nmac"), meeting.inside, strict=True)
@@ -295,20 +307,20 @@ def _events_of(meeting: Meetings) -> dict[str, AnyArray]:
 
 
 def may_climb(block: Block) -> bool:
-    """Return whether a steering block declares that it may command another altitude."""
+    """Return whether a steering block may command other altitudes; True if not declared."""
     asked = getattr(block.cls, "may_climb", None)
     return asked is None or bool(asked(block.parameters))
 
 
-def side_of(bearing_deg: FloatArray) -> AnyArray:
-    """Return in which sector of 90° each bearing lies: ahead, right, behind or left."""
+def bearing_sector(bearing_deg: FloatArray) -> AnyArray:
+    """Return each relative bearing's 90° sector as text: ahead, right, behind or left."""
     sector = np.floor((np.nan_to_num(bearing_deg) + 45.0) % 360.0 / 90.0).astype(int)
     result: AnyArray = np.array(BEARINGS)[sector]
     return result
 
 
 def meetings_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
-    """Return the meetings of runs computed in the plane; None where no run can be computed so."""
+    """Return all runs' closest approaches on straight plane paths; None if the scene forbids it."""
     block, scene = traffic_block(group.scene), group.scene
     parameters = group.parameters_of(block.name)
     one = parameters[0]
@@ -321,5 +333,8 @@ def meetings_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
         or any(r.changes.keys() - {f"blocks.{block.name}.encounter"} for r in group.replicas)
     ):
         return None
-    paths, end_s = pair_paths(encounters_of(group), one.dynamics), float(scene.duration_s or "inf")
-    return meetings(paths, len(group), end_s, p.sizes_m, widen_cylinders(p.sizes_m))
+    paths, end_s = (
+        pair_paths(encounters_of_replicas(group), one.dynamics),
+        float(scene.duration_s or "inf"),
+    )
+    return closest_meetings(paths, len(group), end_s, p.sizes_m, widen_cylinders(p.sizes_m))

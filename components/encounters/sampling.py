@@ -22,7 +22,7 @@ Ints = Sequence[int] | IntArray
 
 
 class EncounterDraws:
-    """Uniform numbers for one purpose."""
+    """Random numbers for one purpose, fixed by encounter number and attempt."""
 
     def __init__(self, seed: int, purpose: str) -> None:
         self._key = np.array(
@@ -33,8 +33,8 @@ class EncounterDraws:
         self._generator = np.random.Philox(key=0)
         self._numbers = np.random.Generator(self._generator)
 
-    def uniform_of_few(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
-        """Return draws as `uniform` does, others than those, faster where they are a handful."""
+    def uniform_fast(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
+        """Return draws in [0, 1), (count, encounters), fast for few, unlike those of `uniform`."""
         number = np.asarray(numbers, dtype=np.uint64)
         attempt = np.asarray(attempts, dtype=np.uint64)
         blocks = np.arange((count + 1) // 2, dtype=np.uint64)[:, np.newaxis]
@@ -49,7 +49,7 @@ class EncounterDraws:
         return result[:count]
 
     def uniform(self, numbers: Ints, count: int, attempts: Ints | int = 0) -> FloatArray:
-        """Return draws in [0, 1) with 53 bits, shape (count, encounters)."""
+        """Return 53-bit draws in [0, 1), (count, encounters), fixed by number and attempt."""
         numbers = np.asarray(numbers).tolist()
         tries = np.broadcast_to(attempts, len(numbers)).tolist()
         counter = np.zeros(4, dtype=np.uint64)
@@ -78,7 +78,7 @@ _BELOW_1 = float(np.nextafter(1.0, 0.0))
 
 @dataclass(frozen=True)
 class SampledTracks:
-    """What the networks gave for some tracks, before anything is rejected.
+    """Values that the networks gave for some tracks, before any of them is rejected.
 
     Values at time 0, their bins from 0 on, and where in its bin each lies, [0, 1), are (variables,
     tracks); `changing` is (seconds + 1, dynamic variables, tracks), as `EncounterModel.dynamic`.
@@ -91,7 +91,7 @@ class SampledTracks:
     changing: FloatArray
 
     def replace(self, indices: IntArray, others: "SampledTracks", which: BoolArray) -> None:
-        """Replace the tracks at these indices by some of other tracks."""
+        """Overwrite, in place, tracks at these indices with `others` where the mask is true."""
         self.initial[:, indices] = others.initial[:, which]
         self.initial_bins[:, indices] = others.initial_bins[:, which]
         self.left[:, indices] = others.left[:, which]
@@ -99,33 +99,33 @@ class SampledTracks:
 
 
 class TrackSampler:
-    """Samples tracks of a model."""
+    """Samples tracks of an encounter model by their numbers."""
 
     def __init__(self, model: EncounterModel, draws: EncounterDraws) -> None:
         self.model = model
         self._draws = draws
         self._low = [bins.low for bins in model.bins]
         self._width = [bins.width for bins in model.bins]
-        dynamic = model.dynamic
+        dynamic = model.dynamic_indices
         self._steps = [
             _Step(model, index, dynamic.index(model.targets[index]))
             for index in model.transition.order
         ]
 
     def sample(self, numbers: Ints, seconds: int, attempts: Ints | int = 0) -> SampledTracks:
-        """Return tracks by their numbers."""
+        """Return the tracks of these numbers and attempts, from 0 to `seconds` once per second."""
         model = self.model
-        variables, changing = len(model.labels), len(model.dynamic)
-        uniform = self._draws.uniform_of_few(numbers, variables, attempts)
+        variables, changing = len(model.labels), len(model.dynamic_indices)
+        uniform = self._draws.uniform_fast(numbers, variables, attempts)
         bins: IntArray = np.zeros((variables, len(numbers)), dtype=np.int64)
         values, left = np.zeros((2, variables, len(numbers)))
         for index in model.initial.order:
             node = model.initial.nodes[index]
-            mine, left[index] = _draw_bins(node, node.column(bins), uniform[index])
+            mine, left[index] = _draw_bins(node, node.column_of_parent_bins(bins), uniform[index])
             bins[index] = mine
             values[index] = self._low[index][mine] + self._width[index][mine] * left[index]
         over_time = np.empty((seconds + 1, changing, len(numbers)))
-        over_time[0] = values[list(model.dynamic)]
+        over_time[0] = values[list(model.dynamic_indices)]
         # Places in the transition network: variables at t, static ones among them, and at t + 1.
         now: IntArray = np.zeros((len(model.sources), len(numbers)), dtype=np.int64)
         for index, source in enumerate(model.sources):
@@ -134,16 +134,16 @@ class TrackSampler:
         count = seconds * changing
         drawn = self._draws.uniform(numbers, count, attempts) if count else np.empty((0, 0))
         rows = drawn.reshape(seconds, changing, len(numbers))
-        fixed = [step.static_columns(now) for step in self._steps]
+        fixed = [step.static_column_offset(now) for step in self._steps]
         for second, row in enumerate(rows, start=1):
             for step, column in zip(self._steps, fixed, strict=True):
-                step.take(now, column, row, over_time[second - 1], over_time[second])
+                step.draw_next(now, column, row, over_time[second - 1], over_time[second])
             for step in self._steps:
                 now[step.before] = now[step.index]
         return SampledTracks(np.asarray(numbers, dtype=np.int64), values, bins, left, over_time)
 
     def batches(self, numbers: range, seconds: int) -> Iterator[SampledTracks]:
-        """Return tracks in batches of a size that suits the processor."""
+        """Yield a range's tracks in batches of a size that suits the processor's cache."""
         for start in range(0, len(numbers), TRACKS_AT_ONCE):
             yield self.sample(numbers[start : start + TRACKS_AT_ONCE], seconds)
 
@@ -170,14 +170,14 @@ class _Step:
             each = np.where(empty, 1.0, np.where(chance > 0.0, 1.0 / chance, 1.0))
         self._each = each.reshape(-1)
 
-    def static_columns(self, now: IntArray) -> IntArray:
-        """Return what static parents add to the columns, which stays for all of a track."""
+    def static_column_offset(self, now: IntArray) -> IntArray:
+        """Return the part of each track's column index due to parents that never change."""
         result: IntArray = np.zeros(now.shape[1], dtype=np.int64)
         for parent, stride in self._static:
             result += stride * now[parent]
         return result
 
-    def take(
+    def draw_next(
         self,
         now: IntArray,
         fixed: IntArray,
@@ -185,7 +185,7 @@ class _Step:
         before: FloatArray,
         after: FloatArray,
     ) -> None:
-        """Draw the variable's bins into `now` and its values into `after`."""
+        """Draw the variable for the next second: its bins into `now`, its values into `after`."""
         u, node = uniform[self._row], self._node
         column = fixed
         for parent, stride in self._moving:
@@ -211,7 +211,7 @@ class _Step:
 def _draw_bins(
     node: NetworkNode, column: IntArray, uniform: FloatArray
 ) -> tuple[IntArray, FloatArray]:
-    """Return the bins into which draws fall, and what is left of them within the bin, [0, 1)."""
+    """Return the bin into which each draw falls, and where within it, as a share in [0, 1)."""
     edges, at = node.flat_edges, column * (node.size + 1)
     bins: IntArray = np.zeros(len(column), dtype=np.int64)
     for k in range(1, node.size):

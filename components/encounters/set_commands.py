@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from components.encounters.encounter_tables import numbers, read_table, select_good_rows
+from components.encounters.encounter_tables import numbers_and_errors, read_table, select_good_rows
 from components.encounters.model_commands import check_origin
-from components.encounters.splitting import expected_copies, nearness, split_set
+from components.encounters.splitting import expected_copies, least_miss_in_nmac_sizes, split_set
 from components.formats.encounter_set import EncounterSet, geometry_class
 from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
 from components.formats.recorded.encounter_tracks import recorded_tracks
 from components.formats.set_file import EncounterSetError, read_set, write_set
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.errors.budgets import refuse_samples
+from dsa_des.errors.budgets import check_sample_count
 from dsa_des.files.input_files import InputFileError, resolve_home
-from dsa_des.files.output_file import PICTURES, check_ending, check_file, write_file
-from dsa_des.files.output_names import reason_of, user_path
+from dsa_des.files.output_file import PICTURES, check_file_ending, check_file_writable, write_file
+from dsa_des.files.output_names import system_error_text, user_path
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
 
@@ -32,13 +32,13 @@ def convert_sets(
     skip_damaged: bool,
     out: str,
 ) -> None:
-    """Write what is in some files as one set, or as a file of waypoints."""
+    """Read files of encounters and write them as one set, or as a file of waypoints."""
     if at is not None:
         check_origin(at)
     path = user_path(out)
     if path.suffix.lower() not in (SET, *WAYPOINTS):
         raise UsageError(f"--out {out}: must end in {SET}, or in {' or '.join(WAYPOINTS)}")
-    check_file(path)
+    check_file_writable(path)
     try:
         encounters = read_encounters(
             [resolve_home(text) for text in files], at, skip_damaged, recorded_tracks
@@ -58,13 +58,13 @@ def convert_sets(
     except EncounterSetError as error:
         raise UsageError(*str(error).split("\n")) from None
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+        raise OutputError(f"{path}: cannot be written: {system_error_text(error)}") from error
     say(f"{path}: {len(encounters)} encounters")
-    _say_what_was_left_out(encounters)
+    _print_notes_on_set(encounters)
 
 
-def _say_what_was_left_out(encounters: EncounterSet) -> None:
-    """Print what was left out of a set, and what was changed in the rows of its files."""
+def _print_notes_on_set(encounters: EncounterSet) -> None:
+    """Print how many damaged encounters were skipped, and the notes on changes while reading."""
     if encounters.skipped:
         say(f"{encounters.skipped} damaged encounters were skipped")
     for note in encounters.notes[:_MOST_NOTES]:
@@ -76,13 +76,13 @@ def _say_what_was_left_out(encounters: EncounterSet) -> None:
 def _value_by_encounter(
     encounters: EncounterSet, text: str, column: str, *options: str, least: bool
 ) -> FloatArray:
-    """Return each encounter's value in a table's column; the least or the last one of several.
+    """Return each encounter's value in a table's column; of several rows the least or the last.
 
     `options` of the command line ask for the columns ``encounter`` and `column`.
     """
     table = read_table(text)
-    number, wrong = numbers(table, "encounter", options[0], flag=False)
-    value, also = numbers(table, column, options[1], flag=False)
+    number, wrong = numbers_and_errors(table, "encounter", options[0], flag=False)
+    value, also = numbers_and_errors(table, column, options[1], flag=False)
     select_good_rows(table, [wrong, also], skip=False)
     known: dict[int, float] = {}
     for n, v in zip(number.astype(np.int64).tolist(), value.tolist(), strict=True):
@@ -98,7 +98,7 @@ _DRAWN, _MOST_NOTES = 12, 20
 
 @dataclass(frozen=True)
 class Closest:
-    """Closest approaches (of the nearest intruder); arrays over encounters.
+    """Figures of the closest approaches to the nearest intruder, one element per encounter.
 
     Vertical is intruder above ownship, closing the relative speed, the course that of the intruder
     against the ownship's, all at that time.
@@ -113,12 +113,12 @@ class Closest:
 
 
 def closest_approaches(encounters: EncounterSet, indices: Sequence[int]) -> Closest:
-    """Return the closest approaches of some encounters, exact along straight paths in the plane."""
-    rows = [_closest(encounters, index) for index in indices]
+    """Return figures of encounters' closest approaches, exact if straight between samples."""
+    rows = [_closest_approach_figures(encounters, index) for index in indices]
     return Closest(encounters.weights[list(indices)], *np.array(rows).T)
 
 
-def _closest(encounters: EncounterSet, index: int) -> tuple[float, ...]:
+def _closest_approach_figures(encounters: EncounterSet, index: int) -> tuple[float, ...]:
     best: tuple[float, tuple[float, ...]] = (math.inf, (math.nan,) * 5)
     for both, a, b in encounters.common_samples(index):
         if len(both) < 2:
@@ -142,12 +142,12 @@ def _closest(encounters: EncounterSet, index: int) -> tuple[float, ...]:
     return best[1]
 
 
-def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
-    """Print what is in a set, and draw it where that is asked for."""
+def print_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
+    """Print a set's encounters: number, weights, closest approaches; draw them on request."""
     path = None if figure is None else user_path(figure, "--figure")
     if path is not None:
-        check_ending(path, PICTURES, "--figure")
-        check_file(path, "--figure")
+        check_file_ending(path, PICTURES, "--figure")
+        check_file_writable(path, "--figure")
     try:
         encounters = read_encounters(
             [resolve_home(text) for text in files], None, skip_damaged, recorded_tracks
@@ -165,22 +165,22 @@ def show_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged
     )
     say(f"sum of weights {total:.6g}, effective sample size {total**2 / squares:.1f}" if squares
         else "all weights are 0")  # fmt: skip
-    _say_what_was_left_out(encounters)
+    _print_notes_on_set(encounters)
     if len(indices) < len(encounters):
         say(f"closest approaches of {len(indices)} of them, evenly spread")
     headings = ["at the closest approach", "5 %", "median", "95 %", "weighted mean"]
-    print_table(console(), "", headings, _rows(closest), right=range(1, 5))
+    print_table(console(), "", headings, _statistics_rows(closest), right=range(1, 5))
     print_table(console(), "", ["geometry", "encounters", "share of the weight"],
-                _classes(closest), right=range(1, 3))  # fmt: skip
+                _geometry_rows(closest), right=range(1, 3))  # fmt: skip
     if path is not None:
         try:
-            _draw(encounters, indices, closest, path)
+            _draw_set(encounters, indices, closest, path)
         except OSError as error:
-            raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+            raise OutputError(f"{path}: cannot be written: {system_error_text(error)}") from error
         say(f"{path}")
 
 
-def _rows(c: Closest) -> list[list[str]]:
+def _statistics_rows(c: Closest) -> list[list[str]]:
     rows = []
     for name, values in (
         ("horizontal, m", c.horizontal_m), ("vertical, m", c.vertical_m), ("time, s", c.time_s),
@@ -194,7 +194,7 @@ def _rows(c: Closest) -> list[list[str]]:
     return rows
 
 
-def _classes(c: Closest) -> list[list[str]]:
+def _geometry_rows(c: Closest) -> list[list[str]]:
     kinds: AnyArray = geometry_class(c.course_deg)
     total = c.weight.sum() or 1.0
     return [
@@ -203,8 +203,8 @@ def _classes(c: Closest) -> list[list[str]]:
     ]
 
 
-def _draw(encounters: EncounterSet, indices: list[int], c: Closest, path: Path) -> None:
-    """Draw histograms of the geometry, as drawn and as weighted, and a plan of a sample."""
+def _draw_set(encounters: EncounterSet, indices: list[int], c: Closest, path: Path) -> None:
+    """Draw histograms of closest approaches, plain and weighted, and sample paths from above."""
     from dsa_des.record.drawing import draw_to_png
 
     with draw_to_png(11.0, 6.5, path) as figure:
@@ -254,26 +254,30 @@ def split_encounters(
     seed: int,
     out: str,
 ) -> None:
-    """Write a set of copies of another set's encounters."""
+    """Write a set with copies of encounters near the event, their weights divided accordingly."""
     if (scores is None) != (score is None):
         raise UsageError("--scores TABLE and --score COLUMN belong together: give both, or neither")
     path = user_path(out)
-    check_ending(path, [SET])
-    check_file(path)
+    check_file_ending(path, [SET])
+    check_file_writable(path)
     try:
         encounters = read_set(resolve_home(file))
     except (EncounterSetError, InputFileError) as error:
         raise UsageError(*str(error).split("\n")) from None
     if scores is None or score is None:
-        near = np.array([nearness(encounters, index) for index in range(len(encounters))])
+        near = np.array(
+            [least_miss_in_nmac_sizes(encounters, index) for index in range(len(encounters))]
+        )
     else:
         near = _value_by_encounter(encounters, scores, score, "--scores", "--score", least=True)
     try:
-        expected = expected_copies(near, _numbers("--levels", levels), _numbers("--copies", copies))
+        expected = expected_copies(
+            near, _parse_numbers("--levels", levels), _parse_numbers("--copies", copies)
+        )
     except ValueError as error:
         raise UsageError(f"--levels {levels} --copies {copies}: {error}") from None
     lengths = np.diff(encounters.starts[encounters.first_rows])
-    refuse_samples(f"--copies {copies}", float(np.sum(expected * lengths)))
+    check_sample_count(f"--copies {copies}", float(np.sum(expected * lengths)))
     made = split_set(encounters, expected, seed)
     if not len(made):
         raise UsageError(f"{file}: no encounter is left; more copies are needed")
@@ -284,7 +288,7 @@ def split_encounters(
     say(f"sum of weights {sums[0]:.6g}, of the set {sums[1]:.6g}")
 
 
-def _numbers(option: str, text: str) -> FloatArray:
+def _parse_numbers(option: str, text: str) -> FloatArray:
     try:
         return np.array([float(word) for word in text.split(",")])
     except ValueError:

@@ -25,7 +25,7 @@ _NMAC = PRESETS["nmac"]
 
 
 def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) -> FloatArray:
-    """Return in how many copies each encounter is expected; less of a score is nearer.
+    """Return each encounter's expected copies, by how many falling levels its score is below.
 
     Levels (k,) fall; copies (k + 1,) go from those of no stage to those of the last.
     """
@@ -46,14 +46,16 @@ def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) 
 
 
 def draw_copies(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray:
-    """Return how many copies there are of each: the whole part, and one more by chance."""
-    uniform = EncounterDraws(seed, "splitting").uniform_of_few(numbers, 1)[0]
+    """Return each encounter's copies: the expected number rounded down or, by chance, up."""
+    uniform = EncounterDraws(seed, "splitting").uniform_fast(numbers, 1)[0]
     result: IntArray = np.floor(expected).astype(np.int64) + (uniform < expected % 1.0)
     return result
 
 
 def split_set(encounters: EncounterSet, expected: FloatArray, seed: int) -> EncounterSet:
-    """Return a set of copies, numbered from 0, that know their family."""
+    """Return a set of copies, numbered from 0, with divided weights and the number of the encounter
+    they are copies of.
+    """
     many = draw_copies(encounters.numbers, expected, seed)
     indices = np.repeat(np.arange(len(encounters)), many)
     family: AnyArray = encounters.extra.get(FAMILY, encounters.numbers)
@@ -66,8 +68,8 @@ def split_set(encounters: EncounterSet, expected: FloatArray, seed: int) -> Enco
     )
 
 
-def nearness(encounters: EncounterSet, index: int) -> float:
-    """Return how near an encounter's flights come, in sizes of the NMAC cylinder.
+def least_miss_in_nmac_sizes(encounters: EncounterSet, index: int) -> float:
+    """Return an encounter's least distance in sizes of the NMAC cylinder; below 1 is an NMAC.
 
     The least, over the times of both paths' samples and over intruders, of the larger of horizontal
     distance over 500 ft and vertical distance over 100 ft; below 1 there is an NMAC. What happens

@@ -47,7 +47,7 @@ class TrackError(ValueError):
 
 
 def _explain_missing_variable(model: EncounterModel, label: str) -> str:
-    """Return what a model is that does not have a variable that is flown."""
+    """Return the words that explain why a model without this variable cannot be flown."""
     there = {*model.labels}
     if {"v_1", "v_2", "hmd", "vmd"} <= there:
         return (
@@ -64,7 +64,7 @@ def _explain_missing_variable(model: EncounterModel, label: str) -> str:
 
 @dataclass(frozen=True)
 class Commands:
-    """What sampled tracks command, ready to be flown: (tracks,), and (seconds + 1, tracks)."""
+    """Sampled commands: altitude, speed at 0 s (tracks,), rates by second (seconds + 1, tracks)."""
 
     altitude_ft: FloatArray
     speed_ft_s: FloatArray
@@ -73,11 +73,11 @@ class Commands:
     turn_rad_s: FloatArray
 
     def take(self, rows: IntArray) -> "Commands":
-        """Return the commands of some tracks."""
+        """Return the commands of the tracks with these indices."""
         return Commands(*(values.take(rows, axis=-1) for values in vars(self).values()))
 
     def fly(self, dynamics: str) -> FlownTracks:
-        """Return the flights, ``"euler"`` or ``"point_mass"``."""
+        """Return the flown tracks, by the dynamics ``euler`` or ``point_mass``."""
         return DYNAMICS[dynamics](
             self.altitude_ft,
             self.speed_ft_s,
@@ -88,7 +88,7 @@ class Commands:
 
 
 class TrackRules:
-    """What a model's tracks command, and which of them are accepted."""
+    """Turns a model's sampled tracks into commands, and tells which tracks are accepted."""
 
     def __init__(self, model: EncounterModel) -> None:
         self.model = model
@@ -113,7 +113,7 @@ class TrackRules:
             p for p in map(model.index_of, (GEOGRAPHY, AIRSPACE, LAYER)) if p is not None
         ]
         self._speed_ft_s, climbs = (
-            self._limits(label) * factor
+            self._usual_limits(label) * factor
             for label, factor in ((SPEED, FT_S_PER_KT), (CLIMB, 1.0 / 60.0))
         )
         self._climb_ft_s = np.abs(climbs).max(axis=0)
@@ -125,21 +125,21 @@ class TrackRules:
         assert index is not None
         return index
 
-    def layers_ft(self, tracks: SampledTracks) -> tuple[FloatArray, FloatArray]:
-        """Return the edges of the altitude layer of each track."""
+    def layer_edges_ft(self, tracks: SampledTracks) -> tuple[FloatArray, FloatArray]:
+        """Return the lower and the upper edge, ft, of the altitude layer of each track."""
         layer = tracks.initial_bins[self._layer]
         return self._edges_ft[layer], self._edges_ft[layer + 1]
 
-    def altitude_ft(self, tracks: SampledTracks) -> FloatArray:
+    def initial_altitude_ft(self, tracks: SampledTracks) -> FloatArray:
         """Return altitudes at time 0, uniform in their layers."""
-        low, high = self.layers_ft(tracks)
+        low, high = self.layer_edges_ft(tracks)
         result: FloatArray = low + (high - low) * tracks.left[self._layer]
         return result
 
     def commands(self, tracks: SampledTracks) -> Commands:
         """Return the commands of tracks, in feet and seconds."""
         return Commands(
-            self.altitude_ft(tracks),
+            self.initial_altitude_ft(tracks),
             tracks.initial[self._index_of(SPEED)] * FT_S_PER_KT,
             self._values_by_second(tracks, ACCELERATION) * FT_S_PER_KT,
             self._values_by_second(tracks, CLIMB) / 60.0,
@@ -147,7 +147,7 @@ class TrackRules:
         )
 
     def _values_by_second(self, tracks: SampledTracks, label: str) -> FloatArray:
-        index, dynamic = self._index_of(label), self.model.dynamic
+        index, dynamic = self._index_of(label), self.model.dynamic_indices
         if index in dynamic:
             result: FloatArray = tracks.changing[:, dynamic.index(index)]
             return result
@@ -156,39 +156,43 @@ class TrackRules:
         ).copy()
 
     def is_accepted(self, tracks: SampledTracks, flown: FlownTracks) -> BoolArray:
-        """Return which flights are accepted."""
-        good = self.flies(tracks, flown.climb_ft_s, flown.speed_ft_s)
-        return good & self.is_inside(flown.up_ft)
+        """Return which flown tracks keep the limits of speed, vertical rate and model altitudes."""
+        good = self.keeps_limits(tracks, flown.climb_ft_s, flown.speed_ft_s)
+        return good & self.is_within_altitudes(flown.up_ft)
 
-    def flies(self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray) -> BoolArray:
-        """Return which tracks keep the limits of speed (ft/s) and vertical rate."""
-        slowest, fastest = self._speed_ft_s[:, self._combination(tracks)]
+    def keeps_limits(
+        self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray
+    ) -> BoolArray:
+        """Return which tracks keep the limits of speed (ft/s) and vertical rate, and start faster
+        than they climb.
+        """
+        slowest, fastest = self._speed_ft_s[:, self._combination_index(tracks)]
         good: BoolArray = speed[0] > np.abs(climb_ft_s[0])
         good &= (speed.min(axis=0) >= slowest) & (speed.max(axis=0) <= fastest)
-        steepest = self.steepest_ft_s(tracks)
+        steepest = self.steepest_climb_ft_s(tracks)
         return good & (climb_ft_s.max(axis=0) <= steepest) & (climb_ft_s.min(axis=0) >= -steepest)
 
-    def is_inside(self, up_ft: FloatArray) -> BoolArray:
-        """Return which tracks stay within the outer edges of the layers, and above the ground."""
+    def is_within_altitudes(self, up_ft: FloatArray) -> BoolArray:
+        """Return which tracks stay within the model's outermost altitudes, and not below 0 ft."""
         lowest = max(float(self._edges_ft[0]), 0.0)
         good: BoolArray = up_ft.min(axis=0) >= lowest
         return good & (up_ft.max(axis=0) <= self._edges_ft[-1])
 
-    def steepest_ft_s(self, tracks: SampledTracks) -> FloatArray:
-        """Return the largest vertical rate that is accepted of each track."""
+    def steepest_climb_ft_s(self, tracks: SampledTracks) -> FloatArray:
+        """Return the largest size of vertical rate, ft/s, that is accepted of each track."""
         # Rounding alone must not reject the value on the edge itself.
-        result: FloatArray = self._climb_ft_s[self._combination(tracks)] * (1.0 + 1e-9)
+        result: FloatArray = self._climb_ft_s[self._combination_index(tracks)] * (1.0 + 1e-9)
         return result
 
-    def _combination(self, tracks: SampledTracks) -> IntArray:
-        """Return the number of each track's area, airspace and layer."""
+    def _combination_index(self, tracks: SampledTracks) -> IntArray:
+        """Return the index of each track's combination of area, airspace and altitude layer."""
         result: AnyArray = np.zeros(len(tracks.numbers), dtype=np.int64)
         for index in self._given:
             result = result * self.model.initial.sizes[index] + tracks.initial_bins[index]
         return result
 
-    def _limits(self, label: str) -> FloatArray:
-        """Return the upper edges of the bins with both points, (2, areas x airspaces x layers)."""
+    def _usual_limits(self, label: str) -> FloatArray:
+        """Return a variable's low and high quantile by area, airspace, layer (2, combinations)."""
         index = self._index_of(label)
         edges = self.model.bins[index].edges
         if edges is None:
@@ -196,7 +200,7 @@ class TrackRules:
                 f"{self.model.path}: variable {label!r} has no edges: its values are no rates"
             )
         try:
-            table = conditional(self.model.initial, self._given, index)
+            table = conditional_distribution(self.model.initial, self._given, index)
         except TrackError as error:
             raise TrackError(f"{self.model.path}: {error}") from None
         summed = np.cumsum(table, axis=1)
@@ -207,8 +211,8 @@ class TrackRules:
         return result
 
 
-def conditional(network: BayesNetwork, given: list[int], index: int) -> FloatArray:
-    """Return the exact distribution of a variable given some others, (combinations, bins).
+def conditional_distribution(network: BayesNetwork, given: list[int], index: int) -> FloatArray:
+    """Return a variable's exact bin probabilities given other variables, (combinations, bins).
 
     The last one given runs fastest; combinations that cannot be have the distribution over all.
     """
@@ -246,7 +250,7 @@ def conditional(network: BayesNetwork, given: list[int], index: int) -> FloatArr
 def sample_accepted_tracks(
     sampler: TrackSampler, rules: TrackRules, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[tuple[SampledTracks, FlownTracks]]:
-    """Yield accepted tracks with their flights, in batches in order of their numbers."""
+    """Yield batches of accepted tracks and flights; each number is sampled until accepted."""
     for start in range(0, len(numbers), _TRACKS_AT_ONCE):
         some = numbers[start : start + _TRACKS_AT_ONCE]
         kept: SampledTracks | None = None

@@ -17,7 +17,7 @@ from dsa_des.time.gauss_markov import LONGEST_S
 
 
 class Weather(Parameters):
-    """The weather; by default there is none, and sensors look through empty space."""
+    """Weather of a scene; by default none, so that sensors look through empty space."""
 
     may_change: ClassVar[tuple[str, ...]] = (
         "gas", "vapour_density_g_m3", "rain_rate_mm_h", "rain_top_m", "fog_water_g_m3",
@@ -92,7 +92,7 @@ class Weather(Parameters):
     )
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of weather that is switched off."""
+        """Return a sentence for each key that has no effect, as wind, rain or fog is absent."""
         said = []
         if not self.wind_mps:
             said += self.note_ineffective("wind_from_deg", because="wind_mps is 0")
@@ -121,7 +121,7 @@ class Weather(Parameters):
         return self
 
     @model_validator(mode="after")
-    def _fog_has_a_thickness(self) -> Self:
+    def _check_fog_thickness(self) -> Self:
         if self.fog_top_m < self.fog_base_m:
             raise ValueError(
                 f"fog_top_m is {self.fog_top_m:g}: it must be at least fog_base_m, "
@@ -131,7 +131,7 @@ class Weather(Parameters):
 
 
 class Accuracy(Parameters):
-    """Errors that a scene allows; effects and rungs proven to stay within them are left out.
+    """Errors a scene tolerates; effects and finer models proven to change less are left out.
 
     Angles are directions, azimuths and elevations in body axes, as far as a sensor looks at them.
     The line of sight is judged by ``angle_deg`` and ``range_m``, and by what its error in range
@@ -187,7 +187,7 @@ class Navigation(Parameters):
 
 
 class Record(Parameters):
-    """What a run folder holds beside what blocks send each other."""
+    """Which further tables a run folder holds, beside the messages of blocks."""
 
     truth: bool | Literal["auto"] = Field(
         default="auto",
@@ -203,7 +203,7 @@ class Record(Parameters):
 
 
 class Terrain(Parameters):
-    """The ground: flat, whose echo a radar may hear, and what hides targets; by default none."""
+    """Ground of a scene: its height, its radar echo and what it hides; by default none."""
 
     height_m: float | None = Field(
         default=None,
@@ -289,7 +289,7 @@ class Terrain(Parameters):
 
     @property
     def raster_zero_m(self) -> float:
-        """Height of the raster's zero above the ellipsoid, m."""
+        """Height above the ellipsoid, m, to which the raster's heights are added."""
         given = self.raster_offset_m
         return self.geoid_undulation_m if given is None else given
 
@@ -299,15 +299,17 @@ class Terrain(Parameters):
             self.relative_permittivity, self.conductivity_s_m, wavelength_m or 0.0
         )
 
-    def ground_m(self, lat_deg: float, lon_deg: float) -> float | None:
-        """Return the height of the ground above the ellipsoid; None where none is known."""
+    def ground_height_m(self, lat_deg: float, lon_deg: float) -> float | None:
+        """Return the ground's height above the ellipsoid at a place, m; None if unknown."""
         if self.raster is None:
             return self.height_m
-        heights, inside = self.raster.raster.height(np.array([lat_deg]), np.array([lon_deg]))
+        heights, inside = self.raster.raster.heights_and_coverage(
+            np.array([lat_deg]), np.array([lon_deg])
+        )
         return float(heights[0]) + self.raster_zero_m if inside[0] else None
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of ground that is switched off, and on made-up ground."""
+        """Return a sentence per key without effect, and one on raster heights filled in."""
         said = []
         if self.raster is None:
             said += self.note_ineffective("raster_offset_m", because="raster is not given")

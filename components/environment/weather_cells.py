@@ -13,20 +13,20 @@ from dsa_des.block.component import Parameters
 
 
 class Within(NamedTuple):
-    """Between which shares of a path, from 0 to 1, it lies in a disc; both 0 where it does not."""
+    """Where a path enters and leaves a disc, as shares of its length (0 to 1); both 0 if missed."""
 
     enters: FloatArray
     leaves: FloatArray
 
 
-def within_disc(
+def path_share_in_disc(
     way_north_m: FloatArray,
     way_east_m: FloatArray,
     centre_north_m: FloatArray,
     centre_east_m: FloatArray,
     radius_m: float,
 ) -> Within:
-    """Return the part of straight paths from the origin above a disc on level ground.
+    """Return at which shares straight paths from the origin enter and leave the air over a disc.
 
     A path w from the origin enters and leaves a disc of radius r around c at shares
     (c·w -+ sqrt(r² w² - (c×w)²)) / w² of itself; one straight up is in it or not.
@@ -70,7 +70,7 @@ class WeatherCell(Parameters):
     def centre_offset_m(
         self, own_place: Sequence[FloatArray], time_s: FloatArray
     ) -> tuple[Any, Any]:
-        """Return where its centre is north and east of places at times of the run, m."""
+        """Return the moving cell centre's offset north and east, m, from places at these times."""
         lat_deg, lon_deg, alt_m = own_place
         lat, lon = (np.full(np.shape(lat_deg), at) for at in (self.lat_deg, self.lon_deg))
         north, east, _ = line_of_sight_ned(lat_deg, lon_deg, alt_m, lat, lon, alt_m, validate=False)
@@ -78,14 +78,18 @@ class WeatherCell(Parameters):
         moved_m = self.speed_mps * time_s
         return north + math.cos(towards) * moved_m, east + math.sin(towards) * moved_m
 
-    def within(
+    def path_share_in_cell(
         self,
         own_place: Sequence[FloatArray],
         line: Sequence[FloatArray],
         time_s: FloatArray,
     ) -> Within:
-        """Return the part of lines of sight inside the cell, given azimuth, elevation and range."""
+        """Return where lines of sight, given by azimuth from north, elevation and range, enter and
+        leave the cell.
+        """
         azimuth, elevation, range_m = line
         level_m = range_m * np.cos(elevation)
         way = level_m * np.cos(azimuth), level_m * np.sin(azimuth)
-        return within_disc(*way, *self.centre_offset_m(own_place, time_s), 1000.0 * self.radius_km)
+        return path_share_in_disc(
+            *way, *self.centre_offset_m(own_place, time_s), 1000.0 * self.radius_km
+        )

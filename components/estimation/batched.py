@@ -31,7 +31,7 @@ def multiply_by_transpose(left: FloatArray, right: FloatArray) -> FloatArray:
     return product(left, right.swapaxes(0, 1))
 
 
-def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
+def matrix_times_vector(matrix: FloatArray, vector: FloatArray) -> FloatArray:
     """Return matrix · vector for (a, k, n) and (k, n)."""
     total = matrix[:, 0] * vector[0]
     for k in range(1, matrix.shape[1]):
@@ -40,15 +40,15 @@ def times(matrix: FloatArray, vector: FloatArray) -> FloatArray:
 
 
 def select_tracks(values: FloatArray, which: IntArray) -> FloatArray:
-    """Return some tracks' values (…, n), contiguous in memory as indexing would not leave them."""
+    """Return a copy of the values (…, n) of these tracks only, contiguous in memory."""
     return values.take(which, axis=-1)
 
 
 class Batch:
-    """Records of arrays over many tracks, on their last axis; parts may be None, or lists."""
+    """A record of arrays whose last axis is tracks; parts may also be lists of arrays or None."""
 
     def take(self, which: IntArray | slice) -> Self:
-        """Return the batch of some tracks."""
+        """Return the record for these tracks only."""
         return type(self)(*(_select_part(part, which) for part in vars(self).values()))
 
 
@@ -61,7 +61,7 @@ def _select_part(part: Any, which: IntArray | slice) -> Any:
 
 
 def is_everything(which: IntArray, count: int) -> bool:
-    """Return whether an index array takes all of `count` in their order: nothing need be copied."""
+    """Return whether an index array counts 0 to count - 1, so that selecting changes nothing."""
     if len(which) != count or (count and (which[0] != 0 or which[-1] != count - 1)):
         return False
     return count < 3 or bool((which == np.arange(count)).all())
@@ -73,7 +73,7 @@ def symmetric(matrix: FloatArray) -> FloatArray:
 
 
 def cholesky(matrix: FloatArray) -> FloatArray:
-    """Return the lower triangular roots of positive definite matrices."""
+    """Return lower triangular Cholesky roots (d, d, n); NaN where not positive definite."""
     size = len(matrix)
     root = np.zeros(matrix.shape)
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -101,7 +101,7 @@ def solve_lower(root: FloatArray, right: FloatArray) -> FloatArray:
     return result
 
 
-def solve_upper(root: FloatArray, right: FloatArray) -> FloatArray:
+def solve_lower_transposed(root: FloatArray, right: FloatArray) -> FloatArray:
     """Return root⁻ᵀ · right for lower triangular roots (d, d, n) and right sides (d, …, n)."""
     size = len(root)
     result = np.empty((*right.shape[:-1], root.shape[-1]))
@@ -121,21 +121,21 @@ def squared_length(vector: FloatArray) -> FloatArray:
     return total
 
 
-def distance_squared(root: FloatArray, apart: FloatArray) -> FloatArray:
-    """Return squared Mahalanobis distances of differences (d, n), by roots of covariances."""
+def mahalanobis_squared(root: FloatArray, apart: FloatArray) -> FloatArray:
+    """Return squared Mahalanobis distances (n,) of differences (d, n), by Cholesky roots."""
     return squared_length(solve_lower(root, apart))
 
 
-def sum_of(parts: Sequence[FloatArray] | FloatArray) -> FloatArray:
-    """Return the sum of arrays, or over the first axis of one, in their order."""
+def sum_in_order(parts: Sequence[FloatArray] | FloatArray) -> FloatArray:
+    """Return the sum of arrays, or of one over its first axis, added one after the other."""
     total: FloatArray = parts[0]
     for part in parts[1:]:
         total = total + part
     return total
 
 
-def log_determinant(root: FloatArray) -> FloatArray:
-    """Return the logarithm of the determinant of the matrices whose roots these are."""
+def log_determinant_from_root(root: FloatArray) -> FloatArray:
+    """Return the logarithm of the determinant of each matrix, given its Cholesky root (d, d, n)."""
     total = np.log(root[0, 0])
     for i in range(1, len(root)):
         total = total + np.log(root[i, i])

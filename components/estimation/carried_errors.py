@@ -21,12 +21,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from components.estimation.batched import (
+    matrix_times_vector,
     multiply_by_transpose,
     product,
     select_tracks,
     squared_length,
     symmetric,
-    times,
 )
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
@@ -50,19 +50,19 @@ _LEVEL = 1e-3
 
 @dataclass(frozen=True)
 class MotionWithErrors:
-    """A motion model beside errors that are forgotten."""
+    """A motion model whose state also holds measurement errors that decay exponentially."""
 
     model: Motion
     lasts_s: tuple[float, ...]
 
     @property
     def size(self) -> int:
-        """Components of the state."""
+        """Number of components of the state, errors included."""
         return self.model.size + len(self.lasts_s)
 
     @property
-    def errors(self) -> slice:
-        """Where they are in the state."""
+    def error_slice(self) -> slice:
+        """Slice of the state's components that are measurement errors."""
         return slice(_MOVING, _MOVING + len(self.lasts_s))
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
@@ -81,20 +81,20 @@ class MotionWithErrors:
         return step
 
     def noise(self, dt_s: FloatArray) -> FloatArray:
-        """Return the covariance of what white noise adds, (d, d, n)."""
+        """Return the covariance that motion and errors gain by noise in a time, (d, d, n)."""
         added = self._embed_matrix(self.model.noise(dt_s))
         for i, kept in enumerate(self._remaining_share(dt_s)):
             added[_MOVING + i, _MOVING + i] = 1.0 - kept * kept
         return added
 
     def _remaining_share(self, dt_s: FloatArray) -> FloatArray:
-        """Return how much of each error is left after a time, the same back as forth."""
+        """Return each error's share left after a time, (errors, n), alike for negative times."""
         apart = np.abs(dt_s)
         at_once = np.where(apart > 0.0, np.inf, 0.0)
         return np.exp(-np.stack([apart / t if t > 0.0 else at_once for t in self.lasts_s]))
 
     def _embed_matrix(self, own: FloatArray) -> FloatArray:
-        """Return a model's matrix with room for the errors."""
+        """Return a motion model's matrix (d, d, n) with rows and columns of 0 added for errors."""
         end = _MOVING + len(self.lasts_s)
         whole = np.zeros((self.size, self.size, own.shape[2]))
         whole[:_MOVING, :_MOVING] = own[:_MOVING, :_MOVING]
@@ -106,7 +106,7 @@ class MotionWithErrors:
 
 @dataclass(frozen=True, eq=False)
 class ReportedErrors:
-    """The errors of measurements that aircraft report, or of pairs of them with tracks."""
+    """Lasting errors of measurements that aircraft report, per measurement or pair with a track."""
 
     ways: Sequence[int]  # Which way each error goes (`NORTH` to `LATENCY`)
     # (errors, n), standard deviation: m, m/s, rad, s; 0 where there is none
@@ -119,7 +119,7 @@ class ReportedErrors:
     ahead_m: FloatArray | None = None
 
     def repeat(self, times: int) -> "ReportedErrors":
-        """Return the errors repeated so many times."""
+        """Return the errors tiled `times` times along the axis of measurements."""
         return ReportedErrors(
             self.ways, np.tile(self.deviation, times), np.tile(self.age_s, times),
             np.tile(self.at_range, times),
@@ -129,7 +129,7 @@ class ReportedErrors:
     def with_track_covariances(
         self, covariance: FloatArray, velocity: FloatArray
     ) -> "ReportedErrors":
-        """Return them for tracks with some covariances, as far as they were reported by these.
+        """Return these errors with the lead over late positions that track covariances hold.
 
         Later reports are late by the same: they tell nothing of it. The speed is known ever better
         and the way by which they are late with it, which would seem to tell; so they are as late
@@ -142,14 +142,14 @@ class ReportedErrors:
         off = np.sqrt(squared_length(ahead - way)) > _SAME_WAY * np.sqrt(squared_length(way))
         return replace(self, ahead_m=np.where(off, np.nan, ahead))
 
-    def _late_distance_m(self, state: FloatArray, deviation: FloatArray) -> FloatArray:
-        """Return how far ahead of late positions targets are that are late by one deviation."""
+    def _lead_over_late_position_m(self, state: FloatArray, deviation: FloatArray) -> FloatArray:
+        """Return how far ahead of a report one deviation late the target is, (3, n), m."""
         way = deviation * state[3:_MOVING]
         return way if self.ahead_m is None else np.where(np.isnan(self.ahead_m), way, self.ahead_m)
 
     @property
     def considered_components(self) -> BoolArray | None:
-        """Return which state components its reports do not correct, (k, n); None for none.
+        """Return which state components (k, n) late reports must not correct; None if none.
 
         All that an aircraft reports is late alike, so its reports do not tell by how much: only
         the errors of linearising would seem to.
@@ -161,13 +161,13 @@ class ReportedErrors:
         return np.concatenate([np.zeros((_MOVING, own.shape[1]), dtype=bool), own])
 
     def expected_measurement(self, kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return the expected measurements of states with these errors, (m, n)."""
+        """Return the measurements (m, n) expected of states, with the errors in the states."""
         return expected_measurement(kind, self._reported_states(state, pose)[0], pose)
 
     def linearise(
         self, kind: Kind, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray]:
-        """Return expected measurements, their derivative by position, velocity and errors."""
+        """Return states' expected measurements, with derivative by position, velocity, errors."""
         reported, by_position, cylinder = self._reported_states(state, pose)
         seen, slope = linearise(kind, reported, pose)
         whole = np.zeros((len(seen), _MOVING + len(self.ways), seen.shape[1]))
@@ -175,18 +175,18 @@ class ReportedErrors:
         if slope.shape[1] > 3:
             whole[:, 3:6] = slope[:, 3:6]
         if LATENCY in self.ways:
-            whole[:, 3:6] -= whole[:, :3] * self._sum(state, LATENCY)
-        effect = self._effects(state, cylinder)
+            whole[:, 3:6] -= whole[:, :3] * self._sum_of_errors(state, LATENCY)
+        effect = self._effects_in_cylinder(state, cylinder)
         whole[:, _MOVING:] = product(slope, effect[: slope.shape[1]])
         return seen, whole
 
-    def effects(self, moving: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return how errors move reported positions and velocities (6, n), (6, errors, n)."""
+    def effects_on_reported_states(self, moving: FloatArray, pose: SensorPose) -> FloatArray:
+        """Return how one deviation of each error moves position and velocity, (6, errors, n)."""
         state = np.zeros((_MOVING + len(self.ways), moving.shape[1]))
         state[:_MOVING] = moving
-        return self._effects(state, self._reported_states(state, pose)[2])
+        return self._effects_in_cylinder(state, self._reported_states(state, pose)[2])
 
-    def _sum(self, state: FloatArray, way: int) -> FloatArray:
+    def _sum_of_errors(self, state: FloatArray, way: int) -> FloatArray:
         total = np.zeros(state.shape[1])
         for i, one in enumerate(self.ways):
             if one == way:
@@ -196,17 +196,21 @@ class ReportedErrors:
     def _reported_states(
         self, state: FloatArray, pose: SensorPose
     ) -> tuple[FloatArray, FloatArray, tuple[FloatArray, ...]]:
-        """Return states as reported, the derivative of positions, and cosines of directions."""
+        """Return states as they would be reported, the derivative of their positions, and the
+        cylinder geometry about the sensor.
+        """
         reported = state[:_MOVING].copy()
-        reported[3] += self._sum(state, SPEED_NORTH)
-        reported[4] += self._sum(state, SPEED_EAST)
-        reported[5] -= self._sum(state, CLIMB)
+        reported[3] += self._sum_of_errors(state, SPEED_NORTH)
+        reported[4] += self._sum_of_errors(state, SPEED_EAST)
+        reported[5] -= self._sum_of_errors(state, CLIMB)
         if LATENCY in self.ways:
             i = self.ways.index(LATENCY)
-            reported[:3] -= state[_MOVING + i] * self._late_distance_m(state, self.deviation[i])
-        height = self._sum(state, HEIGHT)
-        reported[0] += self._sum(state, NORTH) + self.age_s * (reported[3] - state[3])
-        reported[1] += self._sum(state, EAST) + self.age_s * (reported[4] - state[4])
+            reported[:3] -= state[_MOVING + i] * self._lead_over_late_position_m(
+                state, self.deviation[i]
+            )
+        height = self._sum_of_errors(state, HEIGHT)
+        reported[0] += self._sum_of_errors(state, NORTH) + self.age_s * (reported[3] - state[3])
+        reported[1] += self._sum_of_errors(state, EAST) + self.age_s * (reported[4] - state[4])
         reported[2] += self.age_s * (reported[5] - state[5]) - np.where(self.at_range, 0.0, height)
         by_position = np.zeros((3, 3, state.shape[1]))
         for i in range(3):
@@ -219,9 +223,9 @@ class ReportedErrors:
             return reported, by_position, (x / safe, y / safe, safe, -z, far)
         # In a cylinder about the vertical: a bearing turns, a height leaves the range as it is.
         up = -z + np.where(self.at_range, height, 0.0)
-        distance = np.maximum(far + self._sum(state, RANGE), 1.0)
+        distance = np.maximum(far + self._sum_of_errors(state, RANGE), 1.0)
         level = np.sqrt(np.maximum(distance**2 - up**2, (_LEVEL * distance) ** 2))
-        bearing = np.arctan2(y, x) + self._sum(state, BEARING)
+        bearing = np.arctan2(y, x) + self._sum_of_errors(state, BEARING)
         cos, sin = np.cos(bearing), np.sin(bearing)
         turned = np.stack([level * cos, level * sin, -up]) + pose.position_m
         safe = np.maximum(ground, _LEVEL * far)
@@ -240,7 +244,9 @@ class ReportedErrors:
             np.where(at, up, -z), np.where(at, distance, far),
         )  # fmt: skip
 
-    def _effects(self, state: FloatArray, cylinder: tuple[FloatArray, ...]) -> FloatArray:
+    def _effects_in_cylinder(
+        self, state: FloatArray, cylinder: tuple[FloatArray, ...]
+    ) -> FloatArray:
         cos, sin, level, up, distance = cylinder
         result = np.zeros((_MOVING, len(self.ways), len(cos)))
         for i, (way, deviation) in enumerate(zip(self.ways, self.deviation, strict=True)):
@@ -252,7 +258,7 @@ class ReportedErrors:
             elif way == CLIMB:
                 result[5, i], result[2, i] = -deviation, -deviation * self.age_s
             elif way == LATENCY:
-                result[:3, i] = -self._late_distance_m(state, deviation)
+                result[:3, i] = -self._lead_over_late_position_m(state, deviation)
             elif way == HEIGHT:
                 outward = np.where(self.at_range, -up / level, 0.0)
                 result[0, i], result[1, i] = deviation * outward * cos, deviation * outward * sin
@@ -267,17 +273,18 @@ class ReportedErrors:
 
 @dataclass(frozen=True, eq=False)
 class Ages:
-    """How old reported positions and velocities are, (n,) each, s; 0 where not reported."""
+    """Ages in s of positions and velocities when used, (n,) each; 0 where nothing is reported."""
 
     position: FloatArray  # For how long it was carried on
     velocity: FloatArray
     since: FloatArray  # Since the track was last updated: what was new before is in its state
     late: FloatArray  # How much older a position is than it was carried on for
 
-    def errors(
+    def error_covariances(
         self, model: Motion, state: FloatArray, velocity_variance: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return covariances of reported position and velocity, and of the state with it.
+        """Return the covariance of the errors that age adds to reported position and velocity, and
+        the state's covariance with them.
 
         They are (6, 6, n) and (d, 6, n), in m and m/s. What was reported of then is what the
         motion back from now says, less what noise has changed since, seen back from now.
@@ -305,13 +312,13 @@ class Ages:
     def add_age_errors(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
     ) -> Moments:
-        """Return the moments of measurements with the errors that their ages add."""
+        """Return the expected measurements' moments, enlarged by errors from the reports' age."""
         own = model.model if isinstance(model, MotionWithErrors) else model
         slope = np.ascontiguousarray(moments.jacobian[:, :_MOVING])
         if not isinstance(own, ConstantVelocity):
-            moments = self._rotate_back(moments, model, state, covariance)
+            moments = self._correct_for_past_velocity(moments, model, state, covariance)
         speeds = np.stack([covariance[i, i] for i in (3, 4, 5)])
-        error, shared = self.errors(model, state, speeds)
+        error, shared = self.error_covariances(model, state, speeds)
         shared = _clip_cross_covariance(shared, error, covariance)
         known, seen = slope.shape[1], moments.jacobian.shape[1]
         new = multiply_by_transpose(product(slope, error[:known, :known]), slope)
@@ -325,10 +332,10 @@ class Ages:
             shared=with_state[:seen].swapaxes(0, 1),
         )  # fmt: skip
 
-    def _rotate_back(
+    def _correct_for_past_velocity(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
     ) -> Moments:
-        """Return what is expected of velocities as they were, and of positions they carried on.
+        """Return moments corrected for a turn or acceleration since the velocity was reported.
 
         A target that turns or accelerates had another velocity when it was reported; the moments
         are those as if it had this one.
@@ -352,7 +359,8 @@ class Ages:
         both = product(more, moments.cross)
         total = moments.total + both + both.swapaxes(0, 1) + product(more, with_state)
         return replace(
-            moments, expected=moments.expected + times(slope, off), total=symmetric(total),
+            moments, expected=moments.expected + matrix_times_vector(slope, off),
+            total=symmetric(total),
             cross=moments.cross + with_state, jacobian=jacobian,
         )  # fmt: skip
 
@@ -360,7 +368,7 @@ class Ages:
 def _clip_cross_covariance(
     shared: FloatArray, error: FloatArray, covariance: FloatArray
 ) -> FloatArray:
-    """Return what states and errors share (d, k, n), as much less as they must have in common.
+    """Return cross-covariances of states and errors (d, k, n), scaled to correlations up to 1.
 
     A track that later reports brought back to a late one knows some of what changed in between,
     and so shares less of it than what changed: no correlation is beyond 1.

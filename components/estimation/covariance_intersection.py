@@ -16,13 +16,13 @@ import numpy as np
 
 from components.estimation.batched import (
     cholesky,
+    matrix_times_vector,
     multiply_by_transpose,
     product,
     solve_lower,
-    solve_upper,
-    sum_of,
+    solve_lower_transposed,
+    sum_in_order,
     symmetric,
-    times,
 )
 from dsa_des.arrays.types import FloatArray
 
@@ -37,7 +37,7 @@ _CLOSE = 1e-15
 def intersect_covariances(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the state's change, the covariance and the weight after covariance intersection."""
+    """Return state change, new covariance, and own weight (0 to 1), by covariance intersection."""
     root = cholesky(covariance)
     scaled = product(product(root.swapaxes(0, 1), information), root)
     # LAPACK takes matrix by matrix: the result does not depend on the company.
@@ -54,11 +54,12 @@ def intersect_covariances(
         share = 1.0 - weight
     spread = 1.0 / (weight + share * eigenvalues)
     result = symmetric(multiply_by_transpose(turned * spread, turned))
-    return share * times(result, pull), result, weight
+    return share * matrix_times_vector(result, pull), result, weight
 
 
 def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatArray:
-    """Return the root in [0, 1] of Σ cost (1 - λ) / (w + (1 - w) λ)^power, or the nearer end.
+    """Return the weight w in [0, 1] at which Σ cost (1 - λ) / (w + (1 - w) λ)^power is 0, or the
+    nearer end.
 
     By Newton's steps, halving where they leave the bracket; `power` is 1 for the determinant, 2
     for the trace.
@@ -69,8 +70,8 @@ def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatA
         mixed = weight + (1.0 - weight) * eigenvalues
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             term = excess / mixed**power
-            value = sum_of(term)
-            change = -power * sum_of(term * (1.0 - eigenvalues) / mixed)
+            value = sum_in_order(term)
+            change = -power * sum_in_order(term * (1.0 - eigenvalues) / mixed)
         return value, change
 
     count = eigenvalues.shape[-1]
@@ -102,7 +103,7 @@ def inverse(covariance: FloatArray) -> FloatArray:
     identity = np.repeat(np.eye(size)[:, :, np.newaxis], covariance.shape[-1], axis=2)
     # The roots have the tracks on their last axis, the right sides a column before it.
     whole = [
-        solve_upper(root, solve_lower(root, np.ascontiguousarray(identity[:, j])))
+        solve_lower_transposed(root, solve_lower(root, np.ascontiguousarray(identity[:, j])))
         for j in range(size)
     ]
     return symmetric(np.stack(whole, axis=1))

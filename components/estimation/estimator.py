@@ -14,11 +14,11 @@ import numpy as np
 from components.estimation.batched import (
     Batch,
     cholesky,
-    distance_squared,
     is_everything,
+    mahalanobis_squared,
     multiply_by_transpose,
     select_tracks,
-    sum_of,
+    sum_in_order,
     symmetric,
 )
 from components.estimation.carried_errors import MotionWithErrors, ReportedErrors
@@ -26,10 +26,10 @@ from components.estimation.frame import SensorPose
 from components.estimation.kalman import (
     Innovation,
     Moments,
+    equivalent_independent_variance,
     linear_moments,
     log_likelihood,
     update,
-    variance_of_what_is_new,
 )
 from components.estimation.measurement import Kind, linearise, residual
 from components.estimation.motion import Motion, predict
@@ -42,7 +42,7 @@ LEAST = 1e-250
 
 
 class Estimates(NamedTuple):
-    """What is known of many tracks: a Gaussian for each motion model, and the models' odds.
+    """Estimates of many tracks: state and covariance by motion model, and model probabilities.
 
     States are (d, n), covariances (d, d, n), position and velocity first; weights, the models'
     probabilities, (models, n).
@@ -53,7 +53,7 @@ class Estimates(NamedTuple):
     weights: FloatArray
 
     def take(self, which: IntArray) -> "Estimates":
-        """Return the estimates of some tracks."""
+        """Return the estimates of the tracks with these indices."""
         if is_everything(which, self.weights.shape[1]):
             return self
         return Estimates(
@@ -75,7 +75,7 @@ class Estimates(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class PairMeasurement(Batch):
-    """Each model's innovations and likelihoods of pairs of a track and a detection."""
+    """For pairs of track and detection: each model's innovation, residual and likelihood."""
 
     innovations: list[Innovation]  # Of the pairs, for every model
     residuals: list[FloatArray]  # list of (m, pairs)
@@ -87,13 +87,13 @@ class PairMeasurement(Batch):
     log_odds: FloatArray | None = None  # (models, pairs) or None: The likelihoods by these
 
     def take(self, which: IntArray | slice) -> Self:
-        """Return some of the pairs."""
+        """Return the record for the pairs at these indices or in this slice."""
         whole = not isinstance(which, slice) and len(which) == len(self.distance)
         return self if whole else super().take(which)
 
 
 class Estimator(Protocol):
-    """A filter over many tracks; a subclass gives `models`, `predict` and `expect`.
+    """A filter for many tracks; subclasses give `models`, `predict`, `expect` (measurements).
 
     Every operation is an elementwise one over tracks, so that a track's one is the same to the
     bit however many others are computed with it (`components.estimation.batched`).
@@ -101,27 +101,25 @@ class Estimator(Protocol):
 
     @property
     def models(self) -> tuple[Motion, ...]:
-        """Motion models, one for each state that a track has."""
+        """Motion models of the filter, one for each state of a track."""
         ...
 
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
-        """Return tracks after times (n,), not negative."""
+        """Return the tracks predicted by times of 0 or more (n,), s."""
         ...
 
     @property
-    def errors(self) -> int:
-        """Return how many measurement errors a track's state carries after its velocity."""
+    def error_count(self) -> int:
+        """Number of measurement errors that each state holds after position and velocity."""
         return 0
 
     @property
-    def linear(self) -> "Estimator":
-        """The filter for tracks on arcs, whose Gaussian is no ellipse: by slopes where they are."""
+    def linearised(self) -> "Estimator":
+        """The filter linearising at the state, for arc-shaped uncertainty; by default itself."""
         return self
 
     def carrying(self, lasts_s: tuple[float, ...]) -> "Estimator":
-        """Return the filter with lasting errors as states, of such correlation times; itself if
-        none.
-        """
+        """Return the filter whose state adds measurement errors of these correlation times (s)."""
         return self
 
     def expect(
@@ -131,7 +129,7 @@ class Estimator(Protocol):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return each model's moments of measurements of predicted tracks.
+        """Return by model the mean and covariance of measurements expected of predicted tracks.
 
         `reported` are the errors of the measurements, of a filter that carries some.
         """
@@ -140,7 +138,7 @@ class Estimator(Protocol):
     def update(
         self, tracks: Estimates, track: IntArray, pairs: "PairMeasurement", which: IntArray
     ) -> Estimates:
-        """Return tracks `track` (k,) of the predicted ones after the pairs `which` (k,)."""
+        """Return the tracks `track` (k,), each updated with one of the pairs, `which` (k,)."""
         before = tracks.take(track)
         whole = is_everything(which, pairs.residuals[0].shape[1])
         moved = [
@@ -167,7 +165,7 @@ class Estimator(Protocol):
         share: FloatArray,
         updates: Estimates,
     ) -> Estimates:
-        """Return each track as the mixture of itself, if it was missed, and of its updates.
+        """Return each track as the probability-weighted mixture of its prediction and updates.
 
         `missed` (n,) and the `share` of each update (k,), of the track `track` (k,), are
         probabilities and sum to 1 for each track. A track without updates stays as it is, to the
@@ -195,7 +193,7 @@ class Estimator(Protocol):
     def past_model_probabilities(
         self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
     ) -> FloatArray:
-        """Return how likely each model was at a past instant, for each of now, (then, now, n).
+        """Return the probability of each past model, given each model now, (then, now, n).
 
         `weights` are those before that instant; `until_s` and `since_s` the times from there to it
         and from it to now.
@@ -215,20 +213,20 @@ class SingleModelFilter(Estimator):
         return (self.model,)
 
     @property
-    def errors(self) -> int:
-        """Return how many measurement errors the states carry."""
+    def error_count(self) -> int:
+        """Number of measurement errors that the state holds after position and velocity."""
         return len(self.model.lasts_s) if isinstance(self.model, MotionWithErrors) else 0
 
     def carrying(self, lasts_s: tuple[float, ...]) -> Self:
-        """Return the filter with errors as states."""
+        """Return the filter whose state adds measurement errors of these correlation times (s)."""
         return replace(self, model=MotionWithErrors(self.model, lasts_s))
 
 
 class ExtendedKalmanFilter(SingleModelFilter):
-    """Linearises motion and measurement at the state."""
+    """Kalman filter of one model that linearises motion and measurement at the state."""
 
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
-        """Return tracks after times (n,)."""
+        """Return the tracks predicted by these times (n,), s."""
         state, covariance = predict(self.model, tracks.states[0], tracks.covariances[0], dt_s)
         return Estimates([state], [covariance], tracks.weights)
 
@@ -239,7 +237,7 @@ class ExtendedKalmanFilter(SingleModelFilter):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return the moments of expected measurements."""
+        """Return mean and covariance of expected measurements, linearised at the state."""
         how = linearise if reported is None else reported.linearise
         seen, jacobian = how(kind, tracks.states[0], pose)
         return [linear_moments(seen, jacobian, tracks.covariances[0])]
@@ -253,10 +251,12 @@ def pair_measurement(
     common: FloatArray | None,
     weights: FloatArray,
 ) -> PairMeasurement:
-    """Return every model's innovations and likelihoods of pairs."""
+    """Return by model the innovations, residuals and likelihoods of track-detection pairs."""
     innovations = [one.innovation(variance, track) for one in moments]
     residuals = [residual(measured, one.expected) for one in innovations]
-    distances = [distance_squared(i.root, r) for i, r in zip(innovations, residuals, strict=True)]
+    distances = [
+        mahalanobis_squared(i.root, r) for i, r in zip(innovations, residuals, strict=True)
+    ]
     likelihoods = np.empty((len(innovations), len(track)))
     for i, (one, apart) in enumerate(zip(innovations, distances, strict=True)):
         likelihoods[i] = log_likelihood(one, apart)
@@ -269,18 +269,20 @@ def pair_measurement(
     for weight, expected in zip(weights, moments, strict=True):
         for i in range(len(spread)):
             spread[i] += select_tracks(weight * expected.total[i, i], track)
-    new = variance_of_what_is_new(variance, common, spread)
+    new = equivalent_independent_variance(variance, common, spread)
     learning = [one.innovation(new, track) for one in moments]
     odds = None
     if len(learning) > 1:  # the odds of a single model are known
         odds = np.empty_like(likelihoods)
         for i, (one, apart) in enumerate(zip(learning, residuals, strict=True)):
-            odds[i] = log_likelihood(one, distance_squared(one.root, apart))
+            odds[i] = log_likelihood(one, mahalanobis_squared(one.root, apart))
     return PairMeasurement(innovations, residuals, distance, likelihoods, learning, odds)
 
 
-def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntArray) -> FloatArray:
-    """Return the normalised innovations squared of pairs, of the mixture of their models."""
+def mixture_innovation_squared(
+    pairs: PairMeasurement, weights: FloatArray, which: IntArray
+) -> FloatArray:
+    """Return these pairs' normalised innovation squared (n,), for the mixture of all models."""
     if len(weights) == 1:
         return pairs.distance[which]
     residuals = [select_tracks(apart, which) for apart in pairs.residuals]
@@ -293,11 +295,11 @@ def innovation_squared(pairs: PairMeasurement, weights: FloatArray, which: IntAr
         spread += weight * (
             multiply_by_transpose(root, root) + off[:, np.newaxis] * off[np.newaxis]
         )
-    return distance_squared(cholesky(spread), mean)
+    return mahalanobis_squared(cholesky(spread), mean)
 
 
 def log_mixture(weights: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
-    """Return the logarithm of the mean likelihood over models, (models, n) → (n,)."""
+    """Return the log of the likelihood averaged over weighted models, (models, n) to (n,)."""
     if len(weights) == 1:
         return log_likelihoods[0]
     most = log_likelihoods.max(axis=0)
@@ -311,7 +313,9 @@ def log_mixture(weights: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
 def mixture_by_track(
     track: IntArray, count: int, share: FloatArray, states: FloatArray, covariances: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean and covariance of what belongs to each track, with shares that sum to 1."""
+    """Return mean (d, tracks) and covariance (d, d, tracks) of each track's Gaussians, weighted by
+    shares that sum to 1.
+    """
 
     def summed(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(track, weights=values, minlength=count), dtype=float)
@@ -330,11 +334,11 @@ def mixture_by_track(
 def update_model_probabilities(
     probabilities: FloatArray, log_likelihoods: FloatArray
 ) -> FloatArray:
-    """Return the models' probabilities after a look, (models, n), from those before it."""
+    """Return the models' probabilities (models, n) after a measurement, by Bayes' rule."""
     with np.errstate(divide="ignore"):
         logs = np.log(probabilities) + log_likelihoods
     weights = np.exp(logs - logs.max(axis=0))
-    return weights / sum_of(list(weights))
+    return weights / sum_in_order(list(weights))
 
 
 def mixture_moments(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
@@ -343,7 +347,7 @@ def mixture_moments(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
     many = len(states)
     if many == 1:
         return states[0][:6], covariances[0][:6, :6]
-    state = sum_of([probabilities[i] * states[i][:6] for i in range(many)])
+    state = sum_in_order([probabilities[i] * states[i][:6] for i in range(many)])
     covariance = np.zeros((6, 6, state.shape[1]))
     for i in range(many):
         apart = states[i][:6] - state

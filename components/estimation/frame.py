@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import Batch, multiply_by_transpose, product, times
+from components.estimation.batched import Batch, matrix_times_vector, multiply_by_transpose, product
 from components.geometry import local_axes, ned_to_body_unchecked, north_east_up
 from dsa_des.arrays.types import FloatArray
 
@@ -19,7 +19,7 @@ Three = FloatArray | tuple[FloatArray, FloatArray, FloatArray]
 
 @dataclass(frozen=True, eq=False)
 class SensorPose(Batch):
-    """Where sensors are and how they are turned, in frames."""
+    """Position, axes and perhaps velocity of sensors in the frames of tracks."""
 
     position_m: FloatArray  # (3, n), of the sensor in the frame
     # (3, 3, n), turns a vector of the frame into body axes: nose, right wing, floor
@@ -34,7 +34,7 @@ def pose_in_frame(
     attitude_rad: Three,
     velocity_m_s: FloatArray | None = None,
 ) -> SensorPose:
-    """Return where poses are in frames."""
+    """Return sensors' positions (m) and axes in NED frames with these origins (deg, deg, m)."""
     lat, lon, alt = position_deg_m
     from_lat, from_lon, from_alt = origin_deg_m
     # np.array joins a few short arrays in a fifth of the time that np.stack takes.
@@ -52,19 +52,19 @@ def pose_in_frame(
 def vectors_in_frame(
     origin_deg_m: FloatArray, position_deg_m: FloatArray, vector: FloatArray
 ) -> FloatArray:
-    """Return vectors along the horizon's axes at places, (3, n), along those of frames."""
+    """Return NED vectors at places (3, n) in the NED axes of frames with these origins."""
     here, there = ned_axes(*origin_deg_m[:2]), ned_axes(*position_deg_m[:2])
     return _change_axes(vector, there, here)
 
 
 def _change_axes(vector: FloatArray, old: list[FloatArray], new: list[FloatArray]) -> FloatArray:
-    """Return vectors along new axes, of those along old ones, both in the Earth's axes."""
+    """Return vectors (3, n) along new axes, given those along old ones; all axes Earth-centred."""
     in_space = sum(v * axis for v, axis in zip(vector, old, strict=True))
     return np.array([dot(in_space, axis) for axis in new])
 
 
 def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
-    """Return north, east and down of places, in Earth-centred axes, each (3, n)."""
+    """Return unit vectors north, east and down at places, in Earth-centred axes, each (3, n)."""
     east, north, up = (np.array(axis) for axis in local_axes(lat_deg, lon_deg))
     return [north, east, -up]
 
@@ -75,18 +75,18 @@ def dot(one: FloatArray, other: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True, eq=False)
 class FrameChange:
-    """The way from frames to others."""
+    """The change of coordinates between two frames for each track: a shift and a rotation."""
 
     shift_m: FloatArray  # (3, n), where the old frame's origin is in the new frame
     turn: FloatArray  # (3, 3, n), turns a vector of the old frame into the new one's axes
 
     def positions(self, position_m: FloatArray) -> FloatArray:
         """Return positions (3, n) of the old frame in the new one."""
-        return self.shift_m + times(self.turn, position_m)
+        return self.shift_m + matrix_times_vector(self.turn, position_m)
 
     def vectors(self, vector: FloatArray) -> FloatArray:
         """Return vectors (3, n) of the old frame along the new one's axes."""
-        return times(self.turn, vector)
+        return matrix_times_vector(self.turn, vector)
 
     def states(self, state: FloatArray) -> FloatArray:
         """Return positions and velocities (6, n) of the old frame in the new one."""
@@ -103,7 +103,9 @@ class FrameChange:
 
 
 def frame_change(old_deg_m: FloatArray, new_deg_m: FloatArray) -> FrameChange:
-    """Return the way from frames with some origins to frames with others."""
+    """Return the change from frames with old origins to frames with new ones, given as latitude,
+    longitude (deg) and height (m).
+    """
     old, new = (tuple(np.ascontiguousarray(row) for row in rows) for rows in (old_deg_m, new_deg_m))
     north, east, up = north_east_up(*new, *old)
     there, here = ned_axes(old[0], old[1]), ned_axes(new[0], new[1])

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from components.estimation.batched import product, sum_of, symmetric
+from components.estimation.batched import product, sum_in_order, symmetric
 from components.estimation.carried_errors import ReportedErrors
 from components.estimation.estimator import LEAST, Estimates, Estimator
 from components.estimation.frame import SensorPose
@@ -31,7 +31,7 @@ _TERMS = 12
 
 @dataclass(frozen=True)
 class InteractingMultipleModels(Estimator):
-    """Several filters of one model each that share what they know by the models' odds."""
+    """Several filters of one model each, whose estimates are mixed each step by probability."""
 
     filters: tuple[Estimator, ...]
     #: From the row's model to the column's, 1/s; the diagonal is not read.
@@ -42,13 +42,13 @@ class InteractingMultipleModels(Estimator):
 
     @property
     def models(self) -> tuple[Motion, ...]:
-        """The model of each filter."""
+        """Motion model of each filter."""
         return tuple(one.models[0] for one in self.filters)
 
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
-        """Return tracks after times (n,): the models are mixed, then each goes on."""
+        """Return tracks predicted by times (n,), s: estimates are mixed, then filters predict."""
         steps = transition_probabilities(self.rates_per_s, dt_s)
-        states, covariances, weights = mix_models(*tracks, steps, self.fresh, 6 + self.errors)
+        states, covariances, weights = mix_models(*tracks, steps, self.fresh, 6 + self.error_count)
         moved = [
             one.predict(Estimates([x], [p], weights), dt_s)
             for one, x, p in zip(self.filters, states, covariances, strict=True)
@@ -56,12 +56,12 @@ class InteractingMultipleModels(Estimator):
         return Estimates([e.states[0] for e in moved], [e.covariances[0] for e in moved], weights)
 
     @property
-    def errors(self) -> int:
-        """Return how many measurement errors the states of every filter carry."""
-        return self.filters[0].errors
+    def error_count(self) -> int:
+        """Number of measurement errors that the state of every filter holds."""
+        return self.filters[0].error_count
 
     def carrying(self, lasts_s: tuple[float, ...]) -> "InteractingMultipleModels":
-        """Return the filters with errors as states."""
+        """Return the filter whose states add measurement errors of these correlation times (s)."""
         return replace(self, filters=tuple(one.carrying(lasts_s) for one in self.filters))
 
     def expect(
@@ -71,7 +71,7 @@ class InteractingMultipleModels(Estimator):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return each model's moments of expected measurements."""
+        """Return by model the mean and covariance of measurements expected of predicted tracks."""
         return [
             one.expect(kind, Estimates([x], [p], tracks.weights), pose, reported)[0]
             for one, x, p in zip(self.filters, tracks.states, tracks.covariances, strict=True)
@@ -80,12 +80,12 @@ class InteractingMultipleModels(Estimator):
     def past_model_probabilities(
         self, weights: FloatArray, until_s: FloatArray, since_s: FloatArray
     ) -> FloatArray:
-        """Return how likely each model was at a past instant, for each of now, (then, now, n)."""
+        """Return the probability of each past model, given each model now, (then, now, n)."""
         return past_probabilities(self.rates_per_s, weights, until_s, since_s)
 
 
 def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> FloatArray:
-    """Return the probabilities to go from one model to another within a time."""
+    """Return the probability of each model change within a time, (from, to, n); rows sum to 1."""
     generator = np.array(rates_per_s, dtype=float)
     np.fill_diagonal(generator, 0.0)
     np.fill_diagonal(generator, -generator.sum(axis=1))
@@ -118,13 +118,16 @@ def mix_models(
     fresh: Sequence[float] = (),
     shared: int = 6,
 ) -> tuple[list[FloatArray], list[FloatArray], FloatArray]:
-    """Return each model's mixed estimate, and the models' probabilities before the look.
+    """Return the models' mixed states, mixed covariances and predicted probabilities.
 
     `shared` components are in every model's state.
     """
     many = len(states)
     predicted = np.stack(
-        [sum_of([transitions[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+        [
+            sum_in_order([transitions[i, j] * probabilities[i] for i in range(many)])
+            for j in range(many)
+        ]
     )
     predicted = np.maximum(predicted, LEAST)
     new_states, new_covariances = [], []
@@ -135,7 +138,7 @@ def mix_models(
                       fresh[j] if fresh else None)
             for i in range(many)
         ]  # fmt: skip
-        state = sum_of([w * x for w, (x, _) in zip(weights, given, strict=True)])
+        state = sum_in_order([w * x for w, (x, _) in zip(weights, given, strict=True)])
         covariance = np.zeros_like(covariances[j])
         for weight, (x, whole) in zip(weights, given, strict=True):
             apart = x - state
@@ -148,14 +151,14 @@ def mix_models(
 def past_probabilities(
     rates_per_s: FloatArray, probabilities: FloatArray, until_s: FloatArray, since_s: FloatArray
 ) -> FloatArray:
-    """Return how likely each model was at an instant that is past, for each model of now."""
+    """Return the probability of each past model, given each model now, (then, now, n)."""
     many = len(probabilities)
     steps = transition_probabilities(rates_per_s, until_s)
     then = np.stack(
-        [sum_of([steps[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
+        [sum_in_order([steps[i, j] * probabilities[i] for i in range(many)]) for j in range(many)]
     )
     joint = np.maximum(then, LEAST)[:, np.newaxis] * transition_probabilities(rates_per_s, since_s)
-    return np.asarray(joint / np.maximum(sum_of(list(joint)), LEAST))
+    return np.asarray(joint / np.maximum(sum_in_order(list(joint)), LEAST))
 
 
 def _enter_model(
@@ -164,7 +167,7 @@ def _enter_model(
     shared: int,
     fresh: float | None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance of a target that enters another model.
+    """Return one model's state and covariance, converted to another model's state.
 
     What the model has besides the shared components is as its own filter has it, or 0 with the
     variance `fresh`.

@@ -11,7 +11,7 @@ Trans. Automatic Control 38 (1993).
 
 import numpy as np
 
-from components.estimation.batched import select_tracks, times
+from components.estimation.batched import matrix_times_vector, select_tracks
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Innovation, innovation, update
 from components.estimation.measurement import Kind, expected_measurement, linearise, residual
@@ -24,7 +24,7 @@ _FAR, _NEAR = 1.0, 0.05
 _MOST_STEPS = 10
 
 
-def iterate(
+def iterate_updates_in_place(
     kind: Kind,
     pose: SensorPose,
     before: tuple[FloatArray, FloatArray],
@@ -32,13 +32,15 @@ def iterate(
     first: Innovation,
     apart: FloatArray,
 ) -> None:
-    """Repeat updates that went too far along a tangent, in place in `after`.
+    """Repeat, in `after`, Kalman updates with too nonlinear a measurement, until they settle.
 
     `before` and `after` are states and covariances without and with measurements, of which `first`
     is the innovation and `apart` the residual; their errors must be none that states carry. Updates
     within tolerance stay as they are, to the bit.
     """
-    left = np.flatnonzero(_tangent_deviation(kind, pose, before[0], after[0], first) > _FAR)
+    left = np.flatnonzero(
+        _nonlinearity_in_deviations(kind, pose, before[0], after[0], first) > _FAR
+    )
     if len(left) == 0:
         return
     state, covariance = select_tracks(before[0], left), select_tracks(before[1], left)
@@ -51,9 +53,9 @@ def iterate(
     for _ in range(_MOST_STEPS):
         seen, jacobian = linearise(kind, at, pose)
         here = innovation(seen, jacobian, covariance, variance)
-        back = times(jacobian, (at - state)[: jacobian.shape[1]])
+        back = matrix_times_vector(jacobian, (at - state)[: jacobian.shape[1]])
         moved, spread = update(state, covariance, here, residual(measured, seen) + back)
-        bend = _tangent_deviation(kind, pose, at, moved, here)
+        bend = _nonlinearity_in_deviations(kind, pose, at, moved, here)
         ends = np.flatnonzero(bend <= _NEAR)
         after[0][:, left[ends]], after[1][:, :, left[ends]] = moved[:, ends], spread[:, :, ends]
         rest = np.flatnonzero(bend > _NEAR)
@@ -64,12 +66,15 @@ def iterate(
         measured, variance = select_tracks(measured, rest), select_tracks(variance, rest)
 
 
-def _tangent_deviation(
+def _nonlinearity_in_deviations(
     kind: Kind, pose: SensorPose, state: FloatArray, moved: FloatArray, slope: Innovation
 ) -> FloatArray:
-    """Return by how many deviations what is measured leaves the tangent at `state`, at `moved`."""
+    """Return by how many standard deviations the linearised measurement at `state` is wrong at
+    `moved`, the most of all components.
+    """
     step = (moved - state)[: slope.jacobian.shape[1]]
     off = residual(
-        expected_measurement(kind, moved, pose), slope.expected + times(slope.jacobian, step)
+        expected_measurement(kind, moved, pose),
+        slope.expected + matrix_times_vector(slope.jacobian, step),
     )
     return np.asarray(np.sqrt((off * off / slope.spread).max(axis=0)))

@@ -12,12 +12,12 @@ from components.estimation.batched import (
     Batch,
     cholesky,
     is_everything,
-    log_determinant,
+    log_determinant_from_root,
     multiply_by_transpose,
     product,
     select_tracks,
     solve_lower,
-    solve_upper,
+    solve_lower_transposed,
     symmetric,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -28,7 +28,7 @@ _TOGETHER = 2048
 
 @dataclass(frozen=True, eq=False)
 class Innovation(Batch):
-    """The predicted measurement, the covariance of the residual, and how states relate to it."""
+    """Predicted measurement, root of residual covariance, and state-measurement covariance."""
 
     expected: FloatArray  # (m, n)
     root: FloatArray  # (m, m, n), lower triangular root of the covariance of the residual
@@ -46,7 +46,7 @@ class Innovation(Batch):
 
 @dataclass(frozen=True, eq=False)
 class Moments:
-    """Moments of the predicted measurement, before the measurement's own errors."""
+    """Mean and covariance of the predicted measurement, without its own errors."""
 
     expected: FloatArray  # (m, n)
     total: FloatArray  # (m, m, n), covariance of what is expected
@@ -59,7 +59,7 @@ class Moments:
     considered: BoolArray | None = None  # As in `Innovation`
 
     def innovation(self, variance: FloatArray, which: IntArray | None = None) -> Innovation:
-        """Return the innovation of measurements with variances (m, k) of tracks (k,)."""
+        """Return the innovation, with variances (m, k) added, for tracks `which` (k,), or all."""
         expected, total, cross, jacobian = self.expected, self.total, self.cross, self.jacobian
         spread, shared, considered = self.left_over, self.shared, self.considered
         if which is not None and not is_everything(which, expected.shape[1]):
@@ -82,7 +82,7 @@ class Moments:
 
 
 def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
-    """Return the moments of an extended Kalman filter."""
+    """Return mean and covariance of the expected measurement, linearised by its Jacobian."""
     cross = multiply_by_transpose(covariance[:, : jacobian.shape[1]], jacobian)
     return Moments(expected, product(jacobian, cross[: jacobian.shape[1]]), cross, jacobian)
 
@@ -90,14 +90,14 @@ def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: Float
 def innovation(
     expected: FloatArray, jacobian: FloatArray, covariance: FloatArray, variance: FloatArray
 ) -> Innovation:
-    """Return the innovation of an extended Kalman filter for variances (m, n)."""
+    """Return a linearised measurement's innovation, for independent errors of variances (m, n)."""
     return linear_moments(expected, jacobian, covariance).innovation(variance)
 
 
 def update(
     state: FloatArray, covariance: FloatArray, innovation: Innovation, residual: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance after a measurement, in Joseph form."""
+    """Return state and covariance after the Kalman update with these residuals, in Joseph form."""
     count = state.shape[1]
     if count <= _TOGETHER:
         return _update_batch(state, covariance, innovation, residual)
@@ -119,7 +119,7 @@ def _update_batch(
     moved = state + weighted[0] * apart[0]
     for k in range(1, len(apart)):
         moved += weighted[k] * apart[k]
-    spread = joseph(covariance, weighted, innovation)
+    spread = joseph_covariance(covariance, weighted, innovation)
     if innovation.considered is not None:
         # With no gain of their own their covariances with the others are those of the best gain.
         for i, stays in enumerate(innovation.considered):
@@ -128,7 +128,9 @@ def _update_batch(
     return moved, spread
 
 
-def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation) -> FloatArray:
+def joseph_covariance(
+    covariance: FloatArray, weighted: FloatArray, innovation: Innovation
+) -> FloatArray:
     """Return (I - K H) P (I - K H)ᵀ + K R Kᵀ, (d, d, n), symmetric to the bit.
 
     For the components that are measured (the first of `innovation.jacobian`) it is worked out as
@@ -143,7 +145,7 @@ def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation)
     measured = slice(0, known)
     block = whole[measured, measured]
     _subtract_gain_squares(covariance, weighted, measured, measured, whole)
-    gain = solve_upper(innovation.root, weighted[:, measured])
+    gain = solve_lower_transposed(innovation.root, weighted[:, measured])
     if innovation.spread.ndim == 2:
         own = gain * innovation.spread[:, np.newaxis]
     else:
@@ -164,7 +166,7 @@ def joseph(covariance: FloatArray, weighted: FloatArray, innovation: Innovation)
 def _subtract_gain_squares(
     covariance: FloatArray, weighted: FloatArray, rows: slice, columns: slice, out: FloatArray
 ) -> None:
-    """Write some rows and columns of P - K S Kᵀ; mirrored elements are the same to the bit."""
+    """Write P - K S Kᵀ for these rows and columns into `out`, exactly symmetric."""
     part = out[rows, columns]
     term = np.empty_like(part)
     np.multiply(weighted[0, rows, np.newaxis], weighted[0, np.newaxis, columns], out=term)
@@ -178,10 +180,11 @@ def _subtract_gain_squares(
 _MOST = 1e9
 
 
-def variance_of_what_is_new(
+def equivalent_independent_variance(
     variance: FloatArray, common: FloatArray, spread: FloatArray
 ) -> FloatArray:
-    """Return the variances of independent errors that would tell a track as much.
+    """Return the variance of a measurement with independent errors that would improve the track as
+    much as this correlated one.
 
     Where the error of a measurement has the covariance κ with that of what a track expects of it
     (of variance p), the best estimate of both has the variance (p R - κ²) / (p + R - 2 κ)
@@ -198,6 +201,8 @@ def variance_of_what_is_new(
 
 
 def log_likelihood(innovation: Innovation, distance: FloatArray) -> FloatArray:
-    """Return the logarithm of the density of measurements at squared distances, (n,)."""
+    """Return the log Gaussian density (n,), given innovation and squared Mahalanobis distances."""
     many = len(innovation.root)
-    return -0.5 * (distance + log_determinant(innovation.root) + many * np.log(2.0 * np.pi))
+    return -0.5 * (
+        distance + log_determinant_from_root(innovation.root) + many * np.log(2.0 * np.pi)
+    )

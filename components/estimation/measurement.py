@@ -8,7 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import multiply_by_transpose, product, squared_length, times
+from components.estimation.batched import (
+    matrix_times_vector,
+    multiply_by_transpose,
+    product,
+    squared_length,
+)
 from components.estimation.frame import SensorPose, dot
 from components.geometry import unit_vector_unchecked, wrap_pi_unchecked
 from dsa_des.arrays.types import BoolArray, FloatArray
@@ -22,7 +27,7 @@ _NEAREST_M = 1e-3
 
 @dataclass(frozen=True)
 class Kind:
-    """Which are measured, in this order: azimuth, elevation, range, range rate, velocity.
+    """Quantities measured, in order: azimuth, elevation (always), range, range rate, velocity.
 
     The target's velocity is along the frame's axes.
     """
@@ -33,14 +38,14 @@ class Kind:
 
     @property
     def size(self) -> int:
-        """Return the number of quantities."""
+        """Number of quantities of the measurement."""
         return 2 + self.has_range + self.has_range_rate + 3 * self.has_velocity
 
 
 def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> FloatArray:
-    """Return the measurement without error."""
+    """Return the error-free measurement (m, n) that sensors at these poses would make of states."""
     away = state[:3] - pose.position_m
-    x, y, z = times(pose.to_body, away)
+    x, y, z = matrix_times_vector(pose.to_body, away)
     seen = np.empty((kind.size, state.shape[-1]))
     np.arctan2(y, x, out=seen[0])
     np.arctan2(-z, np.hypot(x, y), out=seen[1])
@@ -58,10 +63,12 @@ def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> Flo
 
 
 def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
-    """Return the measurement without error, and its derivative by position and velocity."""
+    """Return the measurement without errors (m, n), and its derivative by position, and velocity if
+    it matters.
+    """
     away = state[:3] - pose.position_m
     turned = pose.to_body
-    x, y, z = times(turned, away)
+    x, y, z = matrix_times_vector(turned, away)
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     square = distance * distance
     level = np.hypot(x, y)
@@ -103,17 +110,17 @@ def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArr
     return seen, jacobian
 
 
-def range_share(away: FloatArray, covariance: FloatArray) -> FloatArray:
-    """Return the standard deviation of the range over the range, of vectors (3, n)."""
+def relative_range_deviation(away: FloatArray, covariance: FloatArray) -> FloatArray:
+    """Return the range's relative standard deviation, of vectors (3, n), covariances (3, 3, n)."""
     squared = squared_length(away)
     along = sum(away[i] * away[j] * covariance[i, j] for i in range(3) for j in range(3))
     return np.asarray(np.sqrt(np.maximum(along, 0.0)) / np.maximum(squared, _NEAREST_M**2))
 
 
-def direction(
+def azimuth_elevation_and_variances(
     away: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return azimuth and elevation of vectors (3, n) along the axes they are in, and variances."""
+    """Return azimuth and elevation (rad) of vectors (3, n), and the variance of each (rad²)."""
     x, y, z = away
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     level = np.hypot(x, y)
@@ -131,14 +138,14 @@ def direction(
 
 
 def residual(measured: FloatArray, expected: FloatArray) -> FloatArray:
-    """Return measured less expected, azimuth and elevation wrapped into (-pi, pi]."""
+    """Return measured less expected, differences of azimuth and elevation wrapped to (-pi, pi]."""
     apart = measured - expected
     apart[:2] = wrap_pi_unchecked(np.ascontiguousarray(apart[:2]))
     return apart
 
 
-def position_of(measured: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
-    """Return where in the frame a measurement with range lies, and the derivative by it."""
+def position_and_jacobian(measured: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
+    """Return a measured position (3, n), and its derivative by azimuth, elevation and range."""
     azimuth, elevation, distance = measured[:3]
     cos_a, sin_a = np.cos(azimuth), np.sin(azimuth)
     cos_e, sin_e = np.cos(elevation), np.sin(elevation)
@@ -146,9 +153,13 @@ def position_of(measured: FloatArray, pose: SensorPose) -> tuple[FloatArray, Flo
     by_azimuth = np.stack([-cos_e * sin_a, cos_e * cos_a, np.zeros_like(azimuth)])
     by_elevation = np.stack([-sin_e * cos_a, -sin_e * sin_a, -cos_e])
     to_frame = pose.to_body.swapaxes(0, 1)
-    unit = times(to_frame, body)
+    unit = matrix_times_vector(to_frame, body)
     jacobian = np.stack(
-        [distance * times(to_frame, by_azimuth), distance * times(to_frame, by_elevation), unit],
+        [
+            distance * matrix_times_vector(to_frame, by_azimuth),
+            distance * matrix_times_vector(to_frame, by_elevation),
+            unit,
+        ],
         axis=1,
     )
     return pose.position_m + distance * unit, jacobian
@@ -160,10 +171,10 @@ def _relative_velocity(state: FloatArray, pose: SensorPose) -> FloatArray:
     return state[3:6] - pose.velocity_m_s
 
 
-def half_angle_rad(
+def cone_half_angle_rad(
     position_m: FloatArray, covariance: FloatArray, pose: SensorPose, sigmas: float
 ) -> FloatArray:
-    """Return how far from its expected direction a target may be seen."""
+    """Return the half angle, rad, of the cone about the expected direction of so many sigmas."""
     seen, by_position = linearise(Kind(has_range=False), position_m, pose)
     spread = multiply_by_transpose(product(by_position, covariance), by_position)
     level = np.cos(seen[1])
@@ -175,16 +186,16 @@ def half_angle_rad(
     return np.minimum(sigmas * np.sqrt(np.maximum(widest, 0.0)), np.pi)
 
 
-def axis_in_body(
+def cone_axis_in_body(
     ahead_s: FloatArray,
     state: FloatArray,
     direction: FloatArray,
     has_range: BoolArray,
     pose: SensorPose,
 ) -> FloatArray:
-    """Return unit vectors from the one who looks along cones' axes, in body axes."""
+    """Return body-axes unit vectors (3, n) to predicted positions, or directions without range."""
     pointed = np.stack(unit_vector_unchecked(direction[0], direction[1]))
     away = state[:3] + ahead_s * state[3:] - pose.position_m
     away = np.where(has_range, away, pointed)
     length = np.sqrt(away[0] ** 2 + away[1] ** 2 + away[2] ** 2)
-    return times(pose.to_body, away / np.maximum(length, 1e-9))
+    return matrix_times_vector(pose.to_body, away / np.maximum(length, 1e-9))

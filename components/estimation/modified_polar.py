@@ -17,11 +17,11 @@ relative one.
 import numpy as np
 
 from components.estimation.batched import (
+    matrix_times_vector,
     multiply_by_transpose,
     product,
     squared_length,
     symmetric,
-    times,
 )
 from components.estimation.frame import dot
 from dsa_des.arrays.types import FloatArray
@@ -35,25 +35,28 @@ _LEAST = 0.8
 _UPRIGHT = 0.1
 
 
-def correct_in_polar(
+def apply_correction_in_polar(
     before: FloatArray, after: FloatArray, covariance: FloatArray, sensor_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a correction in Cartesian coordinates as one in modified polar ones."""
-    axes, distance, by_range, to_polar = _polar(before, sensor_m)
-    change = times(to_polar, after[:6] - before[:6])
+    """Return state and covariance with a Cartesian correction applied as a change of modified polar
+    coordinates instead.
+    """
+    axes, distance, by_range, to_polar = _polar_geometry(before, sensor_m)
+    change = matrix_times_vector(to_polar, after[:6] - before[:6])
     return _apply_polar_change(
         axes, distance, by_range, to_polar, change, after, covariance, sensor_m
     )
 
 
-def correct_by_rotation(
+def apply_correction_by_rotation(
     before: FloatArray,
     after: FloatArray,
     covariance: FloatArray,
     sensor_m: FloatArray,
     sensor_m_s: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a correction of a coarse bearing as one of bearing, distance on the ground and height.
+    """Return state and covariance with a correction applied as a turn about the vertical and a
+    change of ground distance and height.
 
     Where range and height are known far better than the bearing, what is known of a target lies on
     an arc about the vertical through the sensor, and of its motion past the sensor along and across
@@ -65,13 +68,13 @@ def correct_by_rotation(
     cos, sin = away[0] / ground, away[1] / ground
     change = after[:6] - before[:6]
 
-    def level(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def radial_and_tangential(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
         return cos * vector[0] + sin * vector[1], cos * vector[1] - sin * vector[0]
 
-    outward, aside = level(change)
+    outward, aside = radial_and_tangential(change)
     angle = aside / ground
-    along, across = level(velocity)
-    gained, beside = level(change[3:])
+    along, across = radial_and_tangential(velocity)
+    gained, beside = radial_and_tangential(change[3:])
     distance = np.maximum(ground + outward, _NEAREST_M)
     along_then = along + gained + across * angle
     across_then = across + beside - along * angle
@@ -101,16 +104,16 @@ def correct_by_rotation(
     return moved, symmetric(spread)
 
 
-def add_first_range(
+def update_with_first_range(
     state: FloatArray,
     covariance: FloatArray,
     range_m: FloatArray,
     variance_m2: FloatArray,
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return tracks after the first range that is measured of them, by its inverse."""
+    """Return states and covariances updated with tracks' first range, linear in its inverse."""
     measured = np.maximum(range_m, np.maximum(np.sqrt(variance_m2), _NEAREST_M))
-    axes, distance, by_range, to_polar = _polar(state, sensor_m)
+    axes, distance, by_range, to_polar = _polar_geometry(state, sensor_m)
     whole = np.zeros_like(covariance)  # derivative of the polar state by the Cartesian one
     whole[:6, :6] = to_polar
     for i in range(6, len(state)):
@@ -139,13 +142,15 @@ def add_first_range(
     )
 
 
-def _polar(
+def _polar_geometry(
     state: FloatArray, sensor_m: FloatArray
 ) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
-    """Return axes about the line of sight, range, velocity by range, and the derivative."""
+    """Return axes at the line of sight, range, velocity along the axes over range, and the
+    derivative of polar coordinates.
+    """
     away, velocity = state[:3] - sensor_m, state[3:6]
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
-    axes = _axes(away / distance)
+    axes = _line_of_sight_axes(away / distance)
     by_range = np.array([dot(axis, velocity) for axis in axes]) / distance
     return axes, distance, by_range, _polar_jacobian(axes, distance, velocity)
 
@@ -160,7 +165,7 @@ def _apply_polar_change(
     covariance: FloatArray,
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance after a change of polar coordinates."""
+    """Return Cartesian state and covariance after polar coordinates change by `change` (6, n)."""
     row = to_polar[2:3]
     spread = multiply_by_transpose(product(row, covariance[:6, :6]), row)[0, 0]
     least = np.maximum(_LEAST * np.sqrt(np.maximum(spread, 0.0)), 1.0 / _FARTHEST_M)
@@ -170,7 +175,7 @@ def _apply_polar_change(
     moved = state.copy()
     moved[:3] = sensor_m + turned[0] / inverse
     moved[3:6] = sum(w * axis for w, axis in zip(by_range, turned, strict=True)) / inverse
-    step = product(_derivative_by_polar(turned, change[1], inverse, by_range), to_polar)
+    step = product(_state_by_polar_jacobian(turned, change[1], inverse, by_range), to_polar)
     whole = covariance.copy()
     whole[:6, :6] = multiply_by_transpose(product(step, covariance[:6, :6]), step)
     if len(state) > 6:
@@ -179,8 +184,8 @@ def _apply_polar_change(
     return moved, symmetric(whole)
 
 
-def _axes(line: FloatArray) -> list[FloatArray]:
-    """Return the line of sight and two directions across it, each (3, n)."""
+def _line_of_sight_axes(line: FloatArray) -> list[FloatArray]:
+    """Return three orthogonal unit vectors, each (3, n): the line of sight and two across it."""
     upright = np.hypot(line[0], line[1]) < _UPRIGHT
     one = np.where(upright, np.array([[1.0], [0.0], [0.0]]), np.array([[0.0], [0.0], [1.0]]))
     across = _cross(one, line)
@@ -191,7 +196,8 @@ def _axes(line: FloatArray) -> list[FloatArray]:
 def _polar_jacobian(
     axes: list[FloatArray], distance: FloatArray, velocity: FloatArray
 ) -> FloatArray:
-    """Return the derivative of polar coordinates by position and velocity, where both angles are 0.
+    """Return the derivative (6, 6, n) of polar coordinates by position and velocity, at the line of
+    sight.
 
     They are two angles, the inverse of the range, and the velocity along the line of sight and
     across it, divided by the range.
@@ -211,7 +217,7 @@ def _polar_jacobian(
 
 
 def _rotate_axes(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> list[FloatArray]:
-    """Return the axes turned by two angles: about the third, and then towards it."""
+    """Return the axes turned by the first angle about the third, then by the second towards it."""
     line, across, third = axes
     level = np.cos(one) * line + np.sin(one) * across
     return [
@@ -221,10 +227,10 @@ def _rotate_axes(axes: list[FloatArray], one: FloatArray, other: FloatArray) -> 
     ]
 
 
-def _derivative_by_polar(
+def _state_by_polar_jacobian(
     axes: list[FloatArray], other: FloatArray, inverse: FloatArray, by_range: FloatArray
 ) -> FloatArray:
-    """Return the derivative of position and velocity by polar coordinates."""
+    """Return the derivative (6, 6, n) of position and velocity by polar coordinates."""
     line, across, third = axes
     along, side, up = by_range
     distance, cos, sin = 1.0 / inverse, np.cos(other), np.sin(other)

@@ -21,15 +21,15 @@ _SMALL_TURN = 1e-2
 
 
 class Motion(Protocol):
-    """A motion model: how a state and its covariance go on."""
+    """A motion model: predicts states and their covariances over time."""
 
     @property
     def size(self) -> int:
-        """Components of the state; the first six are position and velocity."""
+        """Number of components of the state; the first six are position and velocity."""
         ...
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
-        """Return states (d, n) after the time (n,)."""
+        """Return the states (d, n) moved on by the times (n,), s, without noise."""
         ...
 
     def jacobian(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
@@ -37,14 +37,14 @@ class Motion(Protocol):
         ...
 
     def noise(self, dt_s: FloatArray) -> FloatArray:
-        """Return the covariance of what white noise adds in the time, (d, d, n)."""
+        """Return the covariance that process noise adds in the time, (d, d, n)."""
         ...
 
 
 def predict(
     model: Motion, state: FloatArray, covariance: FloatArray, dt_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance after a time, linearised at the state."""
+    """Return state and covariance predicted by a time, linearised at the state."""
     if isinstance(model, ConstantVelocity):
         return model.predict(state, covariance, dt_s)
     step = model.jacobian(state, dt_s)
@@ -55,7 +55,7 @@ def predict(
 
 @dataclass(frozen=True)
 class ConstantVelocity:
-    """Nearly constant velocity: white acceleration."""
+    """Nearly constant velocity, disturbed by white acceleration."""
 
     # Of the acceleration, the same along every axis: after a time t the velocity has gained the
     # variance intensity · t
@@ -79,7 +79,7 @@ class ConstantVelocity:
 
     def noise(self, dt_s: FloatArray) -> FloatArray:
         """Return the covariance of what white acceleration adds, (6, 6, n)."""
-        return white_acceleration(6, self.intensity_m2_s3, dt_s)
+        return white_acceleration_covariance(6, self.intensity_m2_s3, dt_s)
 
     def predict(
         self, state: FloatArray, covariance: FloatArray, dt_s: FloatArray
@@ -149,7 +149,7 @@ class ConstantAcceleration:
 
 @dataclass(frozen=True)
 class CoordinatedTurn:
-    """A turn in the level plane of the frame at a rate that is estimated.
+    """A level turn at a rate that is part of the state.
 
     The state has the turn rate (rad/s, positive to the right: north over east) at 6. Velocity is
     disturbed by white acceleration, the rate by white noise of its own.
@@ -192,8 +192,8 @@ class CoordinatedTurn:
         return step
 
     def noise(self, dt_s: FloatArray) -> FloatArray:
-        """Return the covariance of what noise adds, (7, 7, n), as if the way were straight."""
-        added = white_acceleration(7, self.intensity_m2_s3, dt_s)
+        """Return the process noise covariance of the time, (7, 7, n), as for a straight path."""
+        added = white_acceleration_covariance(7, self.intensity_m2_s3, dt_s)
         added[6, 6] = self.turn_intensity_rad2_s3 * dt_s
         return added
 
@@ -201,7 +201,9 @@ class CoordinatedTurn:
 def turn_factors(
     rate_rad_s: FloatArray, dt_s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return how far a turn goes along and across per unit of speed, and both by the rate."""
+    """Return the displacement of a turn along and across the initial velocity, per unit of speed,
+    and both derivatives by turn rate.
+    """
     turned = rate_rad_s * dt_s
     small = np.abs(turned) < _SMALL_TURN
     safe = np.where(small, 1.0, turned)
@@ -229,8 +231,10 @@ def turn_factors(
     return dt_s * one, dt_s * other, dt_s * dt_s * one_by, dt_s * dt_s * other_by
 
 
-def white_acceleration(size: int, intensity_m2_s3: float, dt_s: FloatArray) -> FloatArray:
-    """Return the covariance that white acceleration adds to position and velocity, (d, d, n)."""
+def white_acceleration_covariance(
+    size: int, intensity_m2_s3: float, dt_s: FloatArray
+) -> FloatArray:
+    """Return position and velocity covariance from white acceleration in time, (size, size, n)."""
     added = np.zeros((size, size, len(dt_s)))
     square = dt_s * dt_s
     for i in range(3):

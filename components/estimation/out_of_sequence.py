@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 from components.estimation.batched import (
     cholesky,
+    matrix_times_vector,
     multiply_by_transpose,
     product,
     solve_lower,
-    solve_upper,
+    solve_lower_transposed,
     symmetric,
-    times,
 )
 from components.estimation.carried_errors import MotionWithErrors
 from components.estimation.motion import Motion, predict
@@ -30,7 +30,7 @@ from dsa_des.arrays.types import FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Retrodiction:
-    """The state at an instant that is past, given all that is known now."""
+    """A past state estimated from all known now, and the gain that carries corrections to now."""
 
     state: FloatArray  # (d, n)
     covariance: FloatArray  # (d, d, n)
@@ -44,26 +44,28 @@ class Retrodiction:
         corrected: FloatArray,
         corrected_covariance: FloatArray,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the state now after the state then was corrected."""
+        """Return the present state and covariance after the past ones are corrected to these."""
         less = multiply_by_transpose(
             product(self.gain, corrected_covariance - self.covariance), self.gain
         )
-        moved = state + times(self.gain, corrected - self.state)
+        moved = state + matrix_times_vector(self.gain, corrected - self.state)
         return moved, symmetric(covariance + less)
 
 
-def retrodiction(
+def retrodict_between(
     model: Motion,
     before: tuple[FloatArray, FloatArray],
     now: tuple[FloatArray, FloatArray],
     until_then_s: FloatArray,
     since_then_s: FloatArray,
 ) -> Retrodiction:
-    """Return the state at an instant between one before and now."""
+    """Return the smoothed state at an instant between an earlier estimate and the present one."""
     then, spread = predict(model, *before, until_then_s)
     step, noise = model.jacobian(then, since_then_s), model.noise(since_then_s)
     ahead, spread_ahead = predict(model, then, spread, since_then_s)
-    back = _divide_right(product(step, spread), spread_ahead)  # spread · stepᵀ / spread ahead
+    back = _transpose_times_inverse(
+        product(step, spread), spread_ahead
+    )  # spread · stepᵀ / spread ahead
     rest = -product(back, step)
     for i in range(model.size):
         rest[i, i] += 1.0
@@ -72,14 +74,16 @@ def retrodiction(
     covariance = symmetric(total)
     across = multiply_by_transpose(back, now[1])  # of the state then with the state now
     return Retrodiction(
-        then + times(back, now[0] - ahead), covariance, _divide_right(across, covariance)
+        then + matrix_times_vector(back, now[0] - ahead),
+        covariance,
+        _transpose_times_inverse(across, covariance),
     )
 
 
-def retrodiction_by_motion(
+def retrodict_before_start(
     model: Motion, now: tuple[FloatArray, FloatArray], since_s: FloatArray
 ) -> Retrodiction:
-    """Return the state at an instant before the first report, from the present state.
+    """Return the state at a time before the first report, by moving the present estimate back.
 
     Errors that are forgotten were as large then as they are now: backwards they are forgotten as
     they are forwards, and of one that is new at every instant nothing is known.
@@ -88,14 +92,16 @@ def retrodiction_by_motion(
     step, noise = model.jacobian(state, -since_s), model.noise(since_s)
     since = multiply_by_transpose(product(step, noise), step)
     if isinstance(model, MotionWithErrors):
-        since[model.errors, model.errors] = noise[model.errors, model.errors]
+        since[model.error_slice, model.error_slice] = noise[model.error_slice, model.error_slice]
     covariance = symmetric(multiply_by_transpose(product(step, spread), step) + since)
     return Retrodiction(
-        model.move(state, -since_s), covariance, _divide_right(product(step, spread), covariance)
+        model.move(state, -since_s),
+        covariance,
+        _transpose_times_inverse(product(step, spread), covariance),
     )
 
 
-def _divide_right(left: FloatArray, matrix: FloatArray) -> FloatArray:
+def _transpose_times_inverse(left: FloatArray, matrix: FloatArray) -> FloatArray:
     """Return leftᵀ · matrix⁻¹ for symmetric matrices (d, d, n)."""
     root = cholesky(matrix)
-    return solve_upper(root, solve_lower(root, left)).swapaxes(0, 1)
+    return solve_lower_transposed(root, solve_lower(root, left)).swapaxes(0, 1)

@@ -12,7 +12,7 @@ from components.estimation.batched import (
     cholesky,
     multiply_by_transpose,
     solve_lower,
-    solve_upper,
+    solve_lower_transposed,
     symmetric,
 )
 from components.estimation.carried_errors import ReportedErrors
@@ -26,7 +26,7 @@ from dsa_des.arrays.types import FloatArray
 
 @dataclass(frozen=True)
 class SigmaPoints:
-    """Spread and weights of sigma points.
+    """Parameters of the unscented transform: spread and weights of its sigma points.
 
     With the defaults no weight is negative, so that no covariance can lose its sign.
     """
@@ -36,7 +36,7 @@ class SigmaPoints:
     kappa: float = 0.0  # Second spread
 
     def weights(self, size: int) -> tuple[FloatArray, FloatArray, float]:
-        """Return weights of means and covariances, (2 d + 1,), and the spread d + lambda."""
+        """Return weights of means and covariances, (2 d + 1,), and the squared scale d + lambda."""
         spread = self.alpha**2 * (size + self.kappa)
         mean = np.full(2 * size + 1, 0.5 / spread)
         mean[0] = (spread - size) / spread
@@ -44,8 +44,8 @@ class SigmaPoints:
         covariance[0] += 1.0 - self.alpha**2 + self.beta
         return mean, covariance, spread
 
-    def points_of(self, state: FloatArray, covariance: FloatArray) -> FloatArray:
-        """Return the points of states (d, n), shape (d, 2 d + 1, n)."""
+    def points_around(self, state: FloatArray, covariance: FloatArray) -> FloatArray:
+        """Return sigma points (d, 2 d + 1, n) about states (d, n), the state itself first."""
         size = len(state)
         apart = cholesky(covariance) * np.sqrt(self.weights(size)[2])
         points = np.repeat(state[:, np.newaxis], 2 * size + 1, axis=1)
@@ -56,17 +56,17 @@ class SigmaPoints:
 
 @dataclass(frozen=True)
 class UnscentedKalmanFilter(SingleModelFilter):
-    """Takes the moments of motion and measurement from sigma points."""
+    """Kalman filter of one model that takes means and covariances from sigma points."""
 
     sigma: SigmaPoints = SigmaPoints()
 
     @property
-    def linear(self) -> ExtendedKalmanFilter:
-        """Sigma points lie along straight axes, which leave an arc."""
+    def linearised(self) -> ExtendedKalmanFilter:
+        """The extended Kalman filter, as straight sigma points leave a curved uncertainty."""
         return ExtendedKalmanFilter(self.model)
 
     def predict(self, tracks: Estimates, dt_s: FloatArray) -> Estimates:
-        """Return tracks after times (n,)."""
+        """Return the tracks predicted by these times (n,), s, by moving sigma points."""
         (state,), (covariance,), weights = tracks
         state, covariance = predict_unscented(self.model, state, covariance, dt_s, self.sigma)
         return Estimates([state], [covariance], weights)
@@ -78,7 +78,7 @@ class UnscentedKalmanFilter(SingleModelFilter):
         pose: SensorPose,
         reported: ReportedErrors | None = None,
     ) -> list[Moments]:
-        """Return the moments of expected measurements."""
+        """Return mean and covariance of expected measurements, by sigma points."""
         (state,), (covariance,), _ = tracks
         return [unscented_moments(kind, state, covariance, pose, self.sigma, reported)]
 
@@ -90,13 +90,13 @@ def predict_unscented(
     dt_s: FloatArray,
     sigma: SigmaPoints,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance after a time, with moments of moved sigma points."""
+    """Return predicted state and covariance, those of the moved sigma points plus noise."""
     size, count = state.shape
     of_mean, of_covariance, _ = sigma.weights(size)
-    points = sigma.points_of(state, covariance)
+    points = sigma.points_around(state, covariance)
     many = points.shape[1]
     moved = model.move(points.reshape(size, -1), np.tile(dt_s, many)).reshape(size, many, count)
-    mean = _weighted_moments(moved, of_mean)
+    mean = _weighted_sum_of_points(moved, of_mean)
     apart = moved - mean[:, np.newaxis]
     spread = multiply_by_transpose(apart * of_covariance[:, np.newaxis], apart)
     return mean, symmetric(spread + model.noise(dt_s))
@@ -110,14 +110,14 @@ def unscented_moments(
     sigma: SigmaPoints,
     reported: ReportedErrors | None = None,
 ) -> Moments:
-    """Return the moments of what sigma points would be measured as.
+    """Return mean and covariance of the measurements expected of sigma points about the state.
 
     The slope that it bears is that of statistical linearisation, Cᵀ P⁻¹, and its spread what the
     slope leaves over: with both, the Joseph form gives P - K S Kᵀ and stays positive.
     """
     size, count = state.shape
     of_mean, of_covariance, _ = sigma.weights(size)
-    points = sigma.points_of(state, covariance)
+    points = sigma.points_around(state, covariance)
     many = points.shape[1]
     poses = SensorPose(
         np.tile(pose.position_m, many),
@@ -126,10 +126,10 @@ def unscented_moments(
     )
     how = expected_measurement if reported is None else reported.repeat(many).expected_measurement
     seen = how(kind, points.reshape(size, -1), poses).reshape(kind.size, many, count)
-    mean = _weighted_moments(seen, of_mean)
+    mean = _weighted_sum_of_points(seen, of_mean)
     for angle in range(2):
-        sin = _weighted_moments(np.sin(seen[angle])[np.newaxis], of_mean)[0]
-        cos = _weighted_moments(np.cos(seen[angle])[np.newaxis], of_mean)[0]
+        sin = _weighted_sum_of_points(np.sin(seen[angle])[np.newaxis], of_mean)[0]
+        cos = _weighted_sum_of_points(np.cos(seen[angle])[np.newaxis], of_mean)[0]
         mean[angle] = np.arctan2(sin, cos)
     flat = np.repeat(mean[:, np.newaxis], many, axis=1).reshape(kind.size, -1)
     apart = residual(seen.reshape(kind.size, -1), flat).reshape(seen.shape)
@@ -137,7 +137,7 @@ def unscented_moments(
     total = multiply_by_transpose(weighted, apart)
     cross = multiply_by_transpose(points - state[:, np.newaxis], weighted)
     root = cholesky(covariance)
-    slope = solve_upper(root, solve_lower(root, cross)).swapaxes(0, 1)
+    slope = solve_lower_transposed(root, solve_lower(root, cross)).swapaxes(0, 1)
     # As a sum of squares it keeps its sign, which the difference of the two would lose.
     moved = points - state[:, np.newaxis]
     rest = apart.copy()
@@ -147,7 +147,7 @@ def unscented_moments(
     return Moments(mean, symmetric(total), cross, slope, left_over)
 
 
-def _weighted_moments(points: FloatArray, weights: FloatArray) -> FloatArray:
+def _weighted_sum_of_points(points: FloatArray, weights: FloatArray) -> FloatArray:
     total = weights[0] * points[:, 0]
     for k in range(1, points.shape[1]):
         total += weights[k] * points[:, k]

@@ -47,6 +47,6 @@ def stone_soup(
     from components.export.stone_soup_run import recorded_run
 
     tables = tables_of(run)
-    if platform is not None or tables.carrying:
+    if platform is not None or tables.platform_by_block:
         tables = tables.seen_from(platform or tables.own_name)
     return recorded_run(tables, origin, range_rates)

@@ -24,7 +24,7 @@ class Alert:
 
     @property
     def start_s(self) -> float:
-        """When it came."""
+        """Return the time (s) at which the alert's level first rose above 0."""
         return self.levels[0][0]
 
     @property
@@ -34,10 +34,10 @@ class Alert:
 
     @property
     def name(self) -> str | None:
-        """Return the name of the target that the alert is about, or else of the track."""
+        """Return the name of an alert's target, or its track's displayed name if none is known."""
         return self.target or self.track_name
 
-    def stretches(self, run_end_s: float) -> Iterator[tuple[float, float, int]]:
+    def level_periods(self, run_end_s: float) -> Iterator[tuple[float, float, int]]:
         """Yield start, end and level of each period of constant level."""
         ends = [time_s for time_s, _ in self.levels[1:]]
         ends.append(run_end_s if self.end_s is None else self.end_s)
@@ -46,16 +46,16 @@ class Alert:
 
 
 def alerts_of(run: RecordedTables) -> list[Alert]:
-    """Return the alerts of a run in the order in which they came; none where nothing alerts."""
+    """Return a run's alerts in order of start time; an empty list if it has no table of alerts."""
     if "alerts" not in run.tables:
         return []
     for name in ("time_s", "level"):
         run.numbers("alerts", name)  # refuses what another program may have written
     on: dict[Any, Alert] = {}
     result = []
-    rows = sorted(run.tables["alerts"].to_pylist(), key=_look)
-    for (time_s, block), look in groupby(rows, key=_look):
-        now = {(block, _subject_of(row)): row for row in look}
+    rows = sorted(run.tables["alerts"].to_pylist(), key=_time_and_block)
+    for (time_s, block), look in groupby(rows, key=_time_and_block):
+        now = {(block, _track_or_target_of(row)): row for row in look}
         # A track that its block no longer tells of is gone, and its alert with it.
         for about in [a for a in on if a[0] == block and isinstance(a[1], int) and a not in now]:
             on.pop(about).end_s = time_s
@@ -72,9 +72,9 @@ def alerts_of(run: RecordedTables) -> list[Alert]:
     return result
 
 
-def _look(row: dict[str, Any]) -> tuple[float, str]:
+def _time_and_block(row: dict[str, Any]) -> tuple[float, str]:
     return float(row["time_s"]), row.get("block", "")
 
 
-def _subject_of(row: dict[str, Any]) -> Any:
+def _track_or_target_of(row: dict[str, Any]) -> Any:
     return row.get("track") or row["target"]  # tracks count from 1; 0 stands where there are none

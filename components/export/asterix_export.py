@@ -4,7 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from components.display.picture import LINE, estimated_positions, held_positions, sights
+from components.display.picture_plane import (
+    LINE,
+    bearings_and_end_points,
+    estimated_positions,
+    held_positions,
+)
 from components.display.recorded_run import POSE, RecordedTables
 from components.estimation.frame import frame_change
 from components.formats.asterix_records import (
@@ -18,7 +23,7 @@ from components.formats.asterix_records import (
     write_records,
 )
 from components.messages.columns import ORIGIN, VELOCITY
-from components.messages.state_tracks import COVARIANCE, full_covariance
+from components.messages.state_tracks import COVARIANCE, covariance_matrices
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.errors import UsageError
 
@@ -65,10 +70,10 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
     lines = run.stack_columns("detections", LINE)
-    there = np.flatnonzero(np.isfinite(lines).all(axis=0) & ~_has_reported_position(run))
+    there = np.flatnonzero(np.isfinite(lines).all(axis=0) & ~_reported_position_mask(run))
     names = run.texts("detections", "block")
     radars = {names[row] or "" for row in there.tolist()}
-    yield from _scans(run, sic, radars)
+    yield from _north_markers(run, sic, radars)
     if len(there) == 0:
         return
     pose = run.stack_columns("detections", POSE, there)
@@ -82,7 +87,7 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     lit = run.numbers("detections", "illuminated_s")[there]
     time_s = np.where(np.isfinite(lit), lit, run.numbers("detections", "time_s")[there])
     lines = run.stack_columns("detections", LINE, there)
-    bearing, ends = sights(lines, pose)
+    bearing, ends = bearings_and_end_points(lines, pose)
     rate_m_s = run.numbers("detections", "range_rate_m_s")[there]
     for k, row in enumerate(there.tolist()):
         yield AsterixRecord(
@@ -101,9 +106,9 @@ def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
         )
 
 
-def _has_reported_position(run: RecordedTables) -> BoolArray:
-    """Return which detections are reports of an aircraft that says where it is."""
-    if not run.has("detections", "reported_lat_deg"):
+def _reported_position_mask(run: RecordedTables) -> BoolArray:
+    """Return a mask over the detections, True where the aircraft reported its own position."""
+    if not run.has_columns("detections", "reported_lat_deg"):
         return np.zeros(run.tables["detections"].num_rows, dtype=bool)
     return np.isfinite(run.numbers("detections", "reported_lat_deg"))
 
@@ -113,14 +118,14 @@ def _received_reports(run: RecordedTables, sic: dict[str, int]) -> Iterator[Aste
 
     Heights are pressure altitudes.
     """
-    if "detections" not in run.tables or not _has_reported_position(run).any():
+    if "detections" not in run.tables or not _reported_position_mask(run).any():
         return
     names = ("lat_deg", "lon_deg", "alt_m", "north_m_s", "east_m_s", "climb_m_s", "s")
     reported = {name: run.numbers("detections", f"reported_{name}") for name in names}
     address = run.values("detections", "address")
     blocks, targets = (run.texts("detections", name) for name in ("block", "target"))
     sent: set[tuple[str, int, float]] = set()
-    for row in np.flatnonzero(_has_reported_position(run)).tolist():
+    for row in np.flatnonzero(_reported_position_mask(run)).tolist():
         say = {name: float(values[row]) for name, values in reported.items()}
         key = blocks[row] or "", int(address[row]), say["s"]
         if key in sent or not np.isfinite(say["s"]):
@@ -141,7 +146,9 @@ def _received_reports(run: RecordedTables, sic: dict[str, int]) -> Iterator[Aste
         yield AsterixRecord(ADS_B, say["s"], values)
 
 
-def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterator[AsterixRecord]:
+def _north_markers(
+    run: RecordedTables, sic: dict[str, int], radars: set[str]
+) -> Iterator[AsterixRecord]:
     if "scans" not in run.tables:
         return
     positions = run.stack_columns("scans", POSE[:3]).T.tolist()
@@ -155,7 +162,7 @@ def _scans(run: RecordedTables, sic: dict[str, int], radars: set[str]) -> Iterat
             )
 
 
-def _track(
+def _track_time_and_values(
     sic: int, number: int, name: str | None, time_s: float, position: FloatArray
 ) -> tuple[float, dict[str, object]]:
     lat, lon, alt = position.tolist()
@@ -175,14 +182,14 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
     turned = frame_change(origin, positions)
     moves = turned.vectors(run.stack_columns("state_tracks", VELOCITY, rows))
     table = {name: run.numbers("state_tracks", name) for name in COVARIANCE.values()}
-    spread = turned.covariances(full_covariance(table, rows))
+    spread = turned.covariances(covariance_matrices(table, rows))
     errors = np.sqrt(np.maximum(np.stack([spread[i, i] for i in _ERRORS.values()]), 0.0))
     stated = np.asarray(np.isfinite(errors).all(axis=0))
     blocks, statuses = (run.texts("state_tracks", name) for name in ("block", "track_status"))
     numbers = run.values("state_tracks", "track")
     state_s = run.numbers("state_tracks", "state_s")
     for k, row in enumerate(rows.tolist()):
-        time_s, values = _track(
+        time_s, values = _track_time_and_values(
             sic[blocks[row] or ""], int(numbers[row]), None, float(state_s[row]), positions[:, k]
         )
         values |= {
@@ -199,7 +206,7 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
 
 
 def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Yield a record of a tracker's stub track for each measurement, at its instant."""
+    """Yield a system-track record (category 062) for each stub track's row, at measurement time."""
     rows, positions = held_positions(run)
     if len(rows) == 0:
         return
@@ -210,14 +217,14 @@ def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[As
         key = blocks[row] or "", names[row] or ""
         number.setdefault(key, len(number) + 1)
         what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), positions[:, k]
-        yield AsterixRecord(SYSTEM_TRACKS, *_track(*what))
+        yield AsterixRecord(SYSTEM_TRACKS, *_track_time_and_values(*what))
 
 
 def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
-    """Yield the ownship's flight as it would broadcast it."""
+    """Yield the ownship's true flight as ADS-B records (category 021), one for each time."""
     if "truth" not in run.tables:
         return
-    own = run.flights().get(run.own_name)
+    own = run.true_flights().get(run.own_name)
     if own is None:
         return
     north, east = own["velocity_north_m_s"], own["velocity_east_m_s"]

@@ -32,6 +32,6 @@ def export(**options: Any) -> None:
     for viewers of robots' logs;
     operator-csv a row for each alert, with what the operator did about it and when.
     """
-    from components.export.exported import export_run
+    from components.export.export_formats import export_run
 
     export_run(**options)

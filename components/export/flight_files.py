@@ -26,7 +26,8 @@ _XYZ_HEAD = (
 
 
 def daa_text(run: RecordedTables, step_s: float = STEP_S) -> str:
-    """Return the true flights as DAIDALUS and `traffic.daa_file` read them, by instants.
+    """Return the true flights as the text of a `.daa` file, rows in order of time: the format that
+    DAIDALUS and `traffic.daa_file` read.
 
     The ownship comes first; a name that such a file cannot hold is refused. Rows are at multiples
     of `step_s` while an aircraft flies, with 0 at the instants that were recorded: a run records
@@ -41,16 +42,16 @@ def daa_text(run: RecordedTables, step_s: float = STEP_S) -> str:
             -flight["velocity_down_m_s"], np.degrees(flight["heading_rad"]) % 360.0,
         ]  # fmt: skip
 
-    return "\n".join([*_DAA_HEAD, *_rows(run, step_s, columns)]) + "\n"
+    return "\n".join([*_DAA_HEAD, *_text_rows(run, step_s, columns)]) + "\n"
 
 
 def xyz_text(run: RecordedTables, step_s: float = STEP_S) -> str:
-    """Return the true flights as east, north (m) of a reference point, and altitudes.
+    """Return true flights as the text of a `.xyz` file: east, north of a point and altitude (m).
 
     The point is where the ownship is first, at altitude 0; a comment says it. `read_daa` with that
     reference gives the flights again. Steps are those of `daa_text`.
     """
-    own = next(iter(run.flights().values()))
+    own = next(iter(run.true_flights().values()))
     lat, lon = float(own["lat_deg"][0]), float(own["lon_deg"][0])
     there = local_axes(np.array([lat]), np.array([lon]))
 
@@ -76,11 +77,11 @@ def xyz_text(run: RecordedTables, step_s: float = STEP_S) -> str:
         return [east, north, flight["alt_m"], *along, np.degrees(nose) % 360.0]
 
     head = f"# reference point: lat {lat!r} deg, lon {lon!r} deg, alt 0 m"
-    return "\n".join([head, *_XYZ_HEAD, *_rows(run, step_s, columns)]) + "\n"
+    return "\n".join([head, *_XYZ_HEAD, *_text_rows(run, step_s, columns)]) + "\n"
 
 
 def _resample(name: str, flight: Mapping[str, FloatArray], step_s: float) -> dict[str, FloatArray]:
-    """Return a flight at multiples of a step: by cubics that keep places and velocities.
+    """Return a flight at multiples of a step, by cubics through recorded positions, velocities.
 
     Velocities are straight between those of the neighbours.
     """
@@ -113,14 +114,16 @@ def _dot(one: Sequence[Any], other: Sequence[Any]) -> Any:
     return sum(a * b for a, b in zip(one, other, strict=True))
 
 
-def _rows(
+def _text_rows(
     run: RecordedTables,
     step_s: float,
     columns: Callable[[Mapping[str, FloatArray]], Sequence[FloatArray]],
 ) -> list[str]:
-    """Return a row for each aircraft and instant: its name, columns of its flight, the time."""
+    """Return a line of text for each aircraft and time, in order of time: its name, the given
+    columns of its flight, the time.
+    """
     rows: list[tuple[float, int, str]] = []
-    for number, (name, flight) in enumerate(run.flights().items()):
+    for number, (name, flight) in enumerate(run.true_flights().items()):
         if any(c in name for c in ",;\t\n\r ") or not name:
             raise UsageError(f"{run.folder}: the name {name!r} holds what separates cells: rename")
         if step_s:

@@ -6,7 +6,12 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
-from components.display.picture import LINE, estimated_positions, held_positions, sights
+from components.display.picture_plane import (
+    LINE,
+    bearings_and_end_points,
+    estimated_positions,
+    held_positions,
+)
 from components.display.recorded_run import POSE, RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
 from components.export.alert_levels import Alert, alerts_of
@@ -24,7 +29,7 @@ _PLACE = ("lon_deg", "lat_deg", "alt_m")
 
 @dataclass(frozen=True)
 class Course:
-    """A flight, a track, or what an alert was about while it lasted, in ascending time."""
+    """The path of a flight, of a track, or of what an alert is about meanwhile; times ascend."""
 
     name: str
     colour: str
@@ -37,7 +42,7 @@ class Course:
     level: int = 0
 
     def cut(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:
-        """Return times and positions from start to end, both straight between the neighbours."""
+        """Return times (n,), positions (n, 3) from start to end, interpolated linearly at both."""
         start_s, end_s = (float(np.clip(t, *self.time_s[[0, -1]])) for t in (start_s, end_s))
         inside = (self.time_s > start_s) & (self.time_s < end_s)
         time_s = np.unique(np.concatenate(([start_s], self.time_s[inside], [end_s])))
@@ -51,7 +56,9 @@ class Course:
 
 @dataclass(frozen=True)
 class DetectedPlace:
-    """A detection with a range: who detected whom, when and where (as in `Course`)."""
+    """A detection with a range: its sensor, its target, its time and its position (longitude,
+    latitude, height as in `Course`).
+    """
 
     sensor: str
     target: str
@@ -60,13 +67,15 @@ class DetectedPlace:
 
     @property
     def name(self) -> str:
-        """The sensor, and the target if it is one."""
+        """Return the sensor's name, followed by the target's name if a target was detected."""
         return f"{self.sensor} {self.target}".strip()
 
 
 @dataclass(frozen=True)
 class GlobeRun:
-    """All of it; ``marks`` are those of the sensors."""
+    """What a globe shows of a run: flights, tracks, alerts and detections; ``marks`` says how each
+    sensor and tracker is drawn.
+    """
 
     name: str
     end_s: float
@@ -78,18 +87,18 @@ class GlobeRun:
 
 
 def globe_run(run: RecordedTables) -> GlobeRun:
-    """Return the contents of a globe view of a run; `UsageError` for tables of none."""
+    """Collect what a globe shows of a run: flights, tracks, alerts and detections."""
     flights = [
         Course(
             name, ON_DARK["own" if name == run.own_name else "truth"], flight["time_s"],
             np.stack([flight[key] for key in _PLACE], axis=1),
         )
-        for name, flight in run.flights().items()
+        for name, flight in run.true_flights().items()
     ]  # fmt: skip
     end_s = max(float(one.time_s[-1]) for one in flights)
-    seen = list(seen_positions(run))
-    tracks = [*_estimated_courses(run), *_held_courses(run)]
-    marks = marks_in(run, {one.sensor for one in seen} | {one.group for one in tracks})
+    seen = list(detections_with_range(run))
+    tracks = [*_estimated_courses(run), *_stub_track_courses(run)]
+    marks = marks_of_blocks(run, {one.sensor for one in seen} | {one.group for one in tracks})
     painted = [
         Course(one.name, marks[one.group].colour, one.time_s, one.position, one.group)
         for one in tracks
@@ -101,7 +110,7 @@ def globe_run(run: RecordedTables) -> GlobeRun:
         )
         for alert in alerts_of(run)
         if (about := _course_of_alert(alert, flights, tracks)) is not None
-        for start_s, stop_s, level in alert.stretches(end_s)
+        for start_s, stop_s, level in alert.level_periods(end_s)
         if start_s <= about.time_s[-1] and stop_s >= about.time_s[0]
     ]  # fmt: skip
     name = run.folder.resolve().name
@@ -109,13 +118,13 @@ def globe_run(run: RecordedTables) -> GlobeRun:
 
 
 def iso_time(time_s: float) -> str:
-    """Return an instant of a run as globes have it (ISO 8601)."""
+    """Return a time of a run as ISO 8601 text in UTC, counted from a fixed date."""
     moment = START + timedelta(microseconds=round(1e6 * time_s))
     return moment.isoformat().replace("+00:00", "Z")
 
 
-def marks_in(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
-    """Return how blocks of a run are marked, by the types that its scene gives them."""
+def marks_of_blocks(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
+    """Return how each named block is drawn (its `Mark`), from its type in the run's scene."""
     try:
         return block_marks(run.block_types(names))
     except (UsageError, AttributeError):  # another program's scene
@@ -125,7 +134,7 @@ def marks_in(run: RecordedTables, names: set[str]) -> dict[str, Mark]:
 def _course_of_alert(
     alert: Alert, flights: Sequence[Course], tracks: Sequence[Course]
 ) -> Course | None:
-    """Return the flight of an alert's target, or else its track's course."""
+    """Return the path of an alert's target, or else of its track; None if there is none."""
     if alert.target is not None:
         return next((one for one in flights if one.name == alert.target), None)
     # Several trackers may have a track of that number.
@@ -134,8 +143,8 @@ def _course_of_alert(
     return max(mine, key=lambda one: float(one.time_s[-1]), default=None)
 
 
-def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
-    """Yield the detections that have a range."""
+def detections_with_range(run: RecordedTables) -> Iterator[DetectedPlace]:
+    """Yield sensor, target, time and position of detections with a range and an ownship pose."""
     if "detections" not in run.tables:
         return
     names = ("time_s", *LINE, *POSE)
@@ -146,7 +155,7 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
     if len(there) == 0:
         return
     number = run.stack_columns("detections", names, there)
-    _, (lat, lon, alt) = sights(number[1:4], number[4:])
+    _, (lat, lon, alt) = bearings_and_end_points(number[1:4], number[4:])
     sensors, targets = (run.texts("detections", name) for name in ("block", "target"))
     rows = zip(*(part.tolist() for part in (there, number[0], lon, lat, alt)), strict=True)
     for row, at_s, *position in rows:
@@ -154,7 +163,7 @@ def seen_positions(run: RecordedTables) -> Iterator[DetectedPlace]:
 
 
 def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
-    """Yield tracks that were ever confirmed, until they are deleted."""
+    """Yield the paths of all tracks confirmed at some time, without states marked as deleted."""
     rows, positions = estimated_positions(run)
     if len(rows) == 0:
         return
@@ -164,7 +173,7 @@ def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
     names = [(blocks[row] or "", f"#{n}") for row, n in zip(rows.tolist(), numbers, strict=True)]
     lives = status != "deleted"
     sure = np.isin(status, HELD)
-    for name, mine in _group_names(names):
+    for name, mine in _group_indices_by_name(names):
         if sure[mine].any():
             mine = mine[lives[mine]]
             yield _course(
@@ -172,18 +181,20 @@ def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
             )
 
 
-def _held_courses(run: RecordedTables) -> Iterator[Course]:
+def _stub_track_courses(run: RecordedTables) -> Iterator[Course]:
     rows, positions = held_positions(run)
     blocks, targets = (
         (run.texts("tracks", name) for name in ("block", "target")) if len(rows) else ([], [])
     )
     names = [(blocks[row] or "", targets[row] or "") for row in rows.tolist()]
-    for name, mine in _group_names(names):
+    for name, mine in _group_indices_by_name(names):
         yield _course(name, run.numbers("tracks", "measured_s")[rows[mine]], positions[:, mine])
 
 
-def _group_names(names: Sequence[tuple[str, str]]) -> Iterator[tuple[tuple[str, str], IntArray]]:
-    """Yield each name with its indices in the sequence, in order of names."""
+def _group_indices_by_name(
+    names: Sequence[tuple[str, str]],
+) -> Iterator[tuple[tuple[str, str], IntArray]]:
+    """Yield each distinct name, sorted, with the indices at which it occurs in the sequence."""
     result: dict[tuple[str, str], list[int]] = {}
     for position, name in enumerate(names):
         result.setdefault(name, []).append(position)

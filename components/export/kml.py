@@ -20,8 +20,8 @@ _ICONS = {
 _DOT, _RING, _PLANE = "shaded_dot", "donut", "airports"
 
 
-def undulation_of(run: RecordedTables) -> float | None:
-    """Return the geoid's height above the ellipsoid (m) that a run's scene says."""
+def scene_undulation_m(run: RecordedTables) -> float | None:
+    """Return the geoid's height above the ellipsoid (m) that the run's scene states, or None."""
     try:
         terrain = run.scene.get("terrain", {})
         given = terrain.get("geoid_undulation_m") or (
@@ -61,7 +61,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
 
 
 def _look_at_lines(shown: GlobeRun, geoid_m: float) -> list[str]:
-    """Return where a globe looks when it opens the file: at where the ownship begins."""
+    """Return KML LookAt lines, by which a globe first looks at the ownship's first position."""
     lon, lat, alt = shown.flights[0].position[0].tolist()
     return [
         "<LookAt>",
@@ -92,7 +92,7 @@ def _style(
     name: str, colour: str, icon: str, scale: float, width: float, named: float = 0.8
 ) -> Iterator[str]:
     painted = _colour(colour)
-    yield f'<Style id="{_id(name)}">'
+    yield f'<Style id="{_xml_id(name)}">'
     yield (
         f"<IconStyle><color>{painted}</color><scale>{scale}</scale>"
         f"<Icon><href>{_ICON.format(icon)}</href></Icon></IconStyle>"
@@ -107,8 +107,8 @@ def _colour(colour: str) -> str:
     return f"ff{colour[5:7]}{colour[3:5]}{colour[1:3]}".lower()
 
 
-def _id(name: str) -> str:
-    """Return a name as an identifier of XML, which letters, digits and a few marks make up."""
+def _xml_id(name: str) -> str:
+    """Return a name as an XML identifier: all but ASCII letters, digits, - and _ as hex codes."""
     return "".join(
         c if c.isascii() and (c.isalnum() or c in "-_") else f".{ord(c):x}" for c in name
     )
@@ -127,16 +127,16 @@ def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]
             of_one = f"level-{min(one.level, len(LEVELS_ON_DARK))}" if one.level else style
         lines += [
             f"<Placemark><name>{_xml(one.name)}</name>",
-            f"<styleUrl>#{_id(of_one)}</styleUrl><gx:Track>",
+            f"<styleUrl>#{_xml_id(of_one)}</styleUrl><gx:Track>",
             "<altitudeMode>absolute</altitudeMode>",
             *(f"<when>{iso_time(t)}</when>" for t in one.time_s.tolist()),
-            *_coordinates(one.position, geoid_m),
+            *_coordinate_elements(one.position, geoid_m),
             "</gx:Track></Placemark>",
         ]
     return lines
 
 
-def _coordinates(position: FloatArray, geoid_m: float) -> Iterator[str]:
+def _coordinate_elements(position: FloatArray, geoid_m: float) -> Iterator[str]:
     for lon, lat, alt in position.tolist():
         yield f"<gx:coord>{lon} {lat} {alt - geoid_m}</gx:coord>"
 
@@ -148,7 +148,7 @@ def _points(seen: Sequence[DetectedPlace], geoid_m: float) -> list[str]:
         lines += [
             f"<Placemark><name>{_xml(one.name)}</name>",
             f"<TimeStamp><when>{iso_time(one.time_s)}</when></TimeStamp>",
-            f"<styleUrl>#{_id(f'sensor-{one.sensor}')}</styleUrl><Point>",
+            f"<styleUrl>#{_xml_id(f'sensor-{one.sensor}')}</styleUrl><Point>",
             f"<altitudeMode>absolute</altitudeMode>"
             f"<coordinates>{lon},{lat},{alt - geoid_m}</coordinates>",
             "</Point></Placemark>",

@@ -18,12 +18,12 @@ from components.export.globe_run import (
     DETECTION_LASTS_S,
     START,
     DetectedPlace,
-    marks_in,
-    seen_positions,
+    detections_with_range,
+    marks_of_blocks,
 )
 from components.geometry import line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 _NANO = 10**9
 #: The frame of all that is drawn: east, north and up of where the first aircraft begins.
@@ -32,41 +32,44 @@ _FRAME = "map"
 _SIZE_M = 60.0
 
 
-def _object(**properties: Any) -> dict[str, Any]:
+def _json_object_schema(**properties: Any) -> dict[str, Any]:
     return {"type": "object", "properties": properties}
 
 
-def _object_schema(**properties: Any) -> dict[str, Any]:
-    return {"type": "array", "items": _object(**properties)}
+def _json_array_schema(**properties: Any) -> dict[str, Any]:
+    return {"type": "array", "items": _json_object_schema(**properties)}
 
 
 _NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
-_TIME = _object(sec={"type": "integer"}, nsec={"type": "integer"})
-_VECTOR = _object(x=_NUMBER, y=_NUMBER, z=_NUMBER)
-_POSE = _object(position=_VECTOR, orientation=_object(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER))
-_COLOUR = _object(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
+_TIME = _json_object_schema(sec={"type": "integer"}, nsec={"type": "integer"})
+_VECTOR = _json_object_schema(x=_NUMBER, y=_NUMBER, z=_NUMBER)
+_POSE = _json_object_schema(
+    position=_VECTOR, orientation=_json_object_schema(x=_NUMBER, y=_NUMBER, z=_NUMBER, w=_NUMBER)
+)
+_COLOUR = _json_object_schema(r=_NUMBER, g=_NUMBER, b=_NUMBER, a=_NUMBER)
 _FOXGLOVE = {
-    "foxglove.LocationFix": _object(
+    "foxglove.LocationFix": _json_object_schema(
         timestamp=_TIME, frame_id=_TEXT, latitude=_NUMBER, longitude=_NUMBER, altitude=_NUMBER
     ),
-    "foxglove.PoseInFrame": _object(timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
-    "foxglove.SceneUpdate": _object(
-        deletions=_object_schema(timestamp=_TIME, type={"type": "integer"}, id=_TEXT),
-        entities=_object_schema(
+    "foxglove.PoseInFrame": _json_object_schema(timestamp=_TIME, frame_id=_TEXT, pose=_POSE),
+    "foxglove.SceneUpdate": _json_object_schema(
+        deletions=_json_array_schema(timestamp=_TIME, type={"type": "integer"}, id=_TEXT),
+        entities=_json_array_schema(
             timestamp=_TIME,
             frame_id=_TEXT,
             id=_TEXT,
             lifetime=_TIME,
             frame_locked={"type": "boolean"},
-            metadata=_object_schema(key=_TEXT, value=_TEXT),
-            spheres=_object_schema(pose=_POSE, size=_VECTOR, color=_COLOUR),
+            metadata=_json_array_schema(key=_TEXT, value=_TEXT),
+            spheres=_json_array_schema(pose=_POSE, size=_VECTOR, color=_COLOUR),
         ),
     ),
 }
 
 
 def mcap_bytes(run: RecordedTables) -> bytes:
-    """Return a run as MCAP: a topic for each table, each aircraft, and what was detected.
+    """Return a run as the bytes of an MCAP file: a topic for each table, two for each aircraft, and
+    one for the detections.
 
     ``/tables/NAME`` has the rows of a table, null where nothing stands; its schema says the units.
     ``/aircraft/NAME/location`` and ``/pose`` are the true flights, where they are recorded; axes of
@@ -106,7 +109,9 @@ def _tables(run: RecordedTables) -> Iterator[_Message]:
     for name, table in sorted(run.tables.items()):
         if "time_s" not in table.column_names:
             continue
-        schema = _object(**{field.name: _column_schema(field) for field in table.schema})
+        schema = _json_object_schema(
+            **{field.name: _column_schema(field) for field in table.schema}
+        )
         when = run.numbers(name, "time_s")
         run.refuse_large_values(name, {"time_s": when})
         for row, time_s in zip(table.to_pylist(), when.tolist(), strict=True):
@@ -114,7 +119,7 @@ def _tables(run: RecordedTables) -> Iterator[_Message]:
                 key: None if isinstance(value, float) and not math.isfinite(value) else value
                 for key, value in row.items()
             }
-            yield f"/tables/{name}", f"dsa_des.{name}", schema, _instant(time_s), plain
+            yield f"/tables/{name}", f"dsa_des.{name}", schema, _unix_time_ns(time_s), plain
 
 
 def _column_schema(field: Any) -> dict[str, Any]:
@@ -135,8 +140,10 @@ def _column_schema(field: Any) -> dict[str, Any]:
 
 
 def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
-    """Yield flights and detections, around where the ownship begins."""
-    flights = run.flights() if "truth" in run.tables else {}
+    """Yield messages of the true flights and of the detections, with poses relative to the
+    ownship's first position.
+    """
+    flights = run.true_flights() if "truth" in run.tables else {}
     origin: tuple[float, ...] | None = None
     for name, flight in flights.items():
         position = [flight[key] for key in ("lat_deg", "lon_deg", "alt_m")]
@@ -146,7 +153,7 @@ def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
         poses = zip(_offsets(origin, *position), turned, strict=True)
         rows = zip(flight["time_s"].tolist(), *(part.tolist() for part in position), strict=True)
         for (time_s, lat, lon, alt), (offset, turn) in zip(rows, poses, strict=True):
-            when = _instant(time_s)
+            when = _unix_time_ns(time_s)
             fix = {
                 "timestamp": _stamp(when), "frame_id": name,
                 "latitude": lat, "longitude": lon, "altitude": alt,
@@ -155,14 +162,14 @@ def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
             pose = {"timestamp": _stamp(when), "frame_id": _FRAME,
                     "pose": {"position": offset, "orientation": turn}}  # fmt: skip
             yield _message(f"/aircraft/{name}/pose", "foxglove.PoseInFrame", when, pose)
-    ends = list(seen_positions(run))
+    ends = list(detections_with_range(run))
     if not ends:
         return
     lon, lat, alt = np.array([end.position for end in ends]).T
     origin = origin or (float(lat[0]), float(lon[0]), float(alt[0]))
-    marks = marks_in(run, {end.sensor for end in ends})
+    marks = marks_of_blocks(run, {end.sensor for end in ends})
     for number, (end, offset) in enumerate(zip(ends, _offsets(origin, lat, lon, alt), strict=True)):
-        ball = _ball(number, end, offset, marks[end.sensor].colour)
+        ball = _detection_sphere(number, end, offset, marks[end.sensor].colour)
         yield _message("/detections", "foxglove.SceneUpdate", *ball)
 
 
@@ -170,10 +177,10 @@ def _message(topic: str, name: str, at_ns: int, content: dict[str, Any]) -> _Mes
     return topic, name, _FOXGLOVE[name], at_ns, content
 
 
-def _ball(
+def _detection_sphere(
     number: int, end: DetectedPlace, offset: dict[str, float], painted: str
 ) -> tuple[int, dict[str, Any]]:
-    when = _instant(end.time_s)
+    when = _unix_time_ns(end.time_s)
     colour = [int(painted[i : i + 2], 16) / 255.0 for i in (1, 3, 5)]
     sphere = {
         "pose": {"position": offset, "orientation": {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}},
@@ -202,7 +209,7 @@ def _offsets(
 def _orientations(
     origin: tuple[float, ...], position: list[FloatArray], attitude_rad: list[FloatArray]
 ) -> list[dict[str, float]]:
-    """Return quaternions that turn axes forward, left and up into the origin's east, north, up."""
+    """Return quaternions (x, y, z, w) from body axes (forward, left, up) to east, north, up."""
     from scipy.spatial.transform import Rotation
 
     here = np.array([np.full(len(position[0]), value) for value in origin])
@@ -213,7 +220,7 @@ def _orientations(
     return [dict(zip("xyzw", row, strict=True)) for row in turned.as_quat().tolist()]
 
 
-def _instant(time_s: float) -> int:
+def _unix_time_ns(time_s: float) -> int:
     return int(START.timestamp()) * _NANO + round(time_s * _NANO)
 
 

@@ -19,7 +19,8 @@ _JUDGED, _ACTS = ("verified", "rejected"), ("turn", "climb")
 
 
 def operator_csv(run: RecordedTables) -> bytes:
-    """Return a row for each alert: when it came, was on screen, was looked at, judged, acted on.
+    """Return a CSV file with a row for each alert: when it began, was displayed, was looked at, was
+    judged and was acted on.
 
     Alerts are those of `alerts_of`; of several platforms those on which somebody decides, each by
     itself.
@@ -33,13 +34,16 @@ def operator_csv(run: RecordedTables) -> bytes:
         if name not in run.tables:
             raise UsageError(f"{run.folder}: has no {name}.parquet, which {needed} records")
     each = [run]
-    if run.has("decisions", "platform"):
+    if run.has_columns("decisions", "platform"):
         on = sorted({str(name) for name in run.texts("decisions", "platform")})
         each = [run.seen_from(name) for name in on] or each
     rows = []
     for mine in each:
         decisions, taken = mine.tables["decisions"].to_pylist(), set[int]()
-        rows += [_alert_row(alert, names, decisions, taken) for alert, names in _alerts(mine)]
+        rows += [
+            _alert_row(alert, names, decisions, taken)
+            for alert, names in _alert_rows_and_names(mine)
+        ]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, _COLUMNS, lineterminator="\n")
     writer.writeheader()
@@ -47,8 +51,8 @@ def operator_csv(run: RecordedTables) -> bytes:
     return stream.getvalue().encode("utf-8")
 
 
-def _alerts(run: RecordedTables) -> list[tuple[dict[str, Any], set[str | None]]]:
-    """Return the alerts in the order in which they came, and the names of what each is about."""
+def _alert_rows_and_names(run: RecordedTables) -> list[tuple[dict[str, Any], set[str | None]]]:
+    """Return alerts in order of start time: each one's row, and its target's and track's names."""
     result = []
     for alert in alerts_of(run):
         row = {
@@ -65,7 +69,7 @@ def _alert_row(
     decisions: list[dict[str, Any]],
     taken: set[int],
 ) -> dict[str, Any]:
-    """Return the row of an alert with the decisions that belong to it."""
+    """Return an alert's row with the first matching decisions; their numbers go to ``taken``."""
     ended_s = math.inf if alert["ended_s"] is None else alert["ended_s"]
     row = dict(alert)
     for number, one in enumerate(decisions):

@@ -22,9 +22,9 @@ from components.stone_soup.objects import (
     POSITION,
     VELOCITY,
     Poses,
-    detections,
-    instant,
+    make_detections,
     state_vectors,
+    to_datetime,
 )
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
@@ -43,7 +43,7 @@ Origin = tuple[float, float, float]
 
 
 class RecordedDetector(DetectionReader):
-    """Gives look after look: its instant, and what was detected in it, if anything."""
+    """A Stone Soup detector yielding each recorded scan: time and set of detections (or none)."""
 
     looks: "list[tuple[datetime, set[Detection]]]"
 
@@ -54,11 +54,11 @@ class RecordedDetector(DetectionReader):
 
 
 class RecordedMovement(MovingMovable):
-    """Where the ownship believed to be, and how it believed to be turned."""
+    """The ownship's movement in Stone Soup, by its believed positions and attitudes."""
 
     @property
     def orientation(self) -> StateVector:
-        """Return roll, pitch and yaw at the last state, in Stone Soup's sense."""
+        """Return the last state's roll, pitch, yaw as a vector in Stone Soup's sign convention."""
         return self.states[-1].metadata["orientation"]
 
 
@@ -97,9 +97,9 @@ def recorded_run(
     run: RecordedTables, origin: Origin | None = None, range_rates: bool = False
 ) -> StoneSoupRun:
     """Return a run's detections, poses and truth."""
-    flights = run.flights() if "truth" in run.tables else {}
-    columns = _detections(run)
-    pose = _poses(run, columns, flights)
+    flights = run.true_flights() if "truth" in run.tables else {}
+    columns = _detection_columns(run)
+    pose = _ownship_poses(run, columns, flights)
     origin = origin or _origin(run, pose)
     lat, lon, alt = (np.full(pose.shape[1], value) for value in origin)
     moves = np.stack([columns[name] for name in _MOVES]) if range_rates else None
@@ -109,7 +109,7 @@ def recorded_run(
     paths = {name: _path(name, flight, origin) for name, flight in flights.items()}
     own = paths.pop(run.own_name, None)
     detector = RecordedDetector()
-    detector.looks = list(_looks(run, columns, Poses(position)))
+    detector.looks = list(_detections_by_scan(run, columns, Poses(position)))
     return StoneSoupRun(
         detector,
         _platform(run.own_name, columns["time_s"], position, flights.get(run.own_name), origin),
@@ -119,8 +119,10 @@ def recorded_run(
     )
 
 
-def _detections(run: RecordedTables) -> dict[str, Any]:
-    """Return columns of the detections in order of their instants, and what each look is."""
+def _detection_columns(run: RecordedTables) -> dict[str, Any]:
+    """Return the columns of the detections by name; the time is that of illumination where a
+    sweeping beam has one.
+    """
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         raise UsageError(f"{run.folder}: has no detections")
     names = [*_MEASURED, *_VARIANCES, *POSE, "illuminated_s", "time_s"]
@@ -145,10 +147,10 @@ def _detections(run: RecordedTables) -> dict[str, Any]:
     return columns
 
 
-def _poses(
+def _ownship_poses(
     run: RecordedTables, columns: Mapping[str, Any], flights: Mapping[str, Any]
 ) -> FloatArray:
-    """Return the ownship's pose at each detection, (6, n): as believed, or the true one."""
+    """Return the ownship's pose at each detection, (6, n): the recorded belief, else the truth."""
     pose = np.stack([columns[name] for name in POSE])
     unknown = np.isnan(pose).any(axis=0)
     if not unknown.any():
@@ -178,10 +180,12 @@ def _origin(run: RecordedTables, pose: FloatArray) -> Origin:
     return lat, lon, alt
 
 
-def _looks(
+def _detections_by_scan(
     run: RecordedTables, columns: Mapping[str, Any], poses: Poses
 ) -> Iterator[tuple[datetime, set[Detection]]]:
-    """Yield looks by their instants; those of one instant with ranges first, then by name."""
+    """Yield each scan's time and its set of detections, in order of time; at equal times sensors
+    with ranges come first, then by name.
+    """
     block, time_s = columns["block"], columns["time_s"]
     ranged = set(block[np.isfinite(columns["range_m"])])
     result: dict[tuple[float, bool, str], list[int]] = {}
@@ -197,28 +201,31 @@ def _looks(
     variances = np.stack([columns[name] for name in _VARIANCES])
     for (when, _, name), rows_of in sorted(result.items()):
         says = [{"sensor": name, "scan": int(columns["scan"][i])} for i in rows_of]
-        at = instant(when)
-        yield at, detections(poses, rows_of, at, values[:, rows_of], variances[:, rows_of], says)
+        at = to_datetime(when)
+        yield (
+            at,
+            make_detections(poses, rows_of, at, values[:, rows_of], variances[:, rows_of], says),
+        )
 
 
 def _path(name: str, flight: Mapping[str, FloatArray], origin: Origin) -> GroundTruthPath:
     position = [np.ascontiguousarray(flight[key]) for key in _PLACE]
     here = [np.full(len(position[0]), value) for value in origin]
     north, east, up = north_east_up(*here, *position)
-    states = state_vectors(np.stack([north, east, -up]), _velocity(flight, position, here))
+    states = state_vectors(np.stack([north, east, -up]), _velocity_in_frame(flight, position, here))
     return GroundTruthPath(
         [
-            GroundTruthState(state, timestamp=instant(time_s), metadata={"name": name})
+            GroundTruthState(state, timestamp=to_datetime(time_s), metadata={"name": name})
             for state, time_s in zip(states, flight["time_s"].tolist(), strict=True)
         ],
         id=name,
     )
 
 
-def _velocity(
+def _velocity_in_frame(
     flight: Mapping[str, FloatArray], position: list[FloatArray], here: list[FloatArray]
 ) -> FloatArray:
-    """Return velocities along the frame's axes, of those along the aircraft's own horizon."""
+    """Return velocities along the common axes, from those along each position's own horizon."""
     own = np.stack([flight[name] for name in _VELOCITY])
     return vectors_in_frame(np.array(here), np.array(position), own)
 
@@ -234,14 +241,14 @@ def _platform(
     velocity = np.full((3, len(when)), np.nan)
     if own is not None:
         at = [np.ascontiguousarray(own[key]) for key in _PLACE]
-        known = _velocity(own, at, [np.full(len(at[0]), value) for value in origin])
+        known = _velocity_in_frame(own, at, [np.full(len(at[0]), value) for value in origin])
         velocity = np.stack([np.interp(when, own["time_s"], part) for part in known])
     states = state_vectors(position.position_m[:, first], velocity)
     poses = Poses(position.take(first))
     movement = RecordedMovement(
         states=[
             GroundTruthState(
-                state, timestamp=instant(at_s), metadata={"orientation": poses.orientation(i)}
+                state, timestamp=to_datetime(at_s), metadata={"orientation": poses.orientation(i)}
             )
             for i, (state, at_s) in enumerate(zip(states, when.tolist(), strict=True))
         ],

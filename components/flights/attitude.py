@@ -46,7 +46,8 @@ def fit_path(
     Both are east, north and up in the sample's own frame, of one aircraft (n,) or of several that
     have the same times (n, aircraft). Samples within half of the window, and always the two
     neighbours, have equal weight; where there are fewer than three, or too clumped ones, a straight
-    line is fitted. Of a block of a path, `offsets` are those of the whole (`blocks_of_path`).
+    line is fitted. Of a block of a path, `offsets` are those of the whole
+    (`overlapping_path_blocks`).
     """
     east, north, up = local_axes(lat_deg, lon_deg)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
@@ -59,19 +60,22 @@ def fit_path(
         )
 
     # The reference sample is at the origin by definition, so only displacements are summed.
-    offsets = _offsets(time_s, window_s) if offsets is None else offsets
-    return _fit(time_s, displacement, lat_deg.shape, offsets, degree=2, window_s=window_s)
+    offsets = _neighbour_offsets(time_s, window_s) if offsets is None else offsets
+    return _fit_derivatives(
+        time_s, displacement, lat_deg.shape, offsets, degree=2, window_s=window_s
+    )
 
 
-def blocks_of_path(
+def overlapping_path_blocks(
     time_s: FloatArray,
 ) -> Iterator[tuple[slice, slice, slice, Sequence[int]]]:
-    """Yield slices that divide a long path into blocks, for fits around its samples.
+    """Yield blocks of a path as (slice with neighbours, the block within that slice, the block
+    within the path, offsets for `fit_path`).
 
     Each is a block with its neighbours on either side, which rows of that are its own, which these
     are of the path, and the offsets of `fit_path`.
     """
-    offsets = _offsets(time_s, WINDOW_S)
+    offsets = _neighbour_offsets(time_s, WINDOW_S)
     reach, count = offsets[-1], len(time_s)
     for first in range(0, count, CELLS_AT_ONCE):
         end, start = min(first + CELLS_AT_ONCE, count), max(first - reach, 0)
@@ -79,8 +83,8 @@ def blocks_of_path(
         yield slice(start, end + reach), inner, slice(first, end), offsets
 
 
-def _offsets(time_s: FloatArray, window_s: float) -> Sequence[int]:
-    """Return how many samples away those are that a sample is fitted with."""
+def _neighbour_offsets(time_s: FloatArray, window_s: float) -> Sequence[int]:
+    """Return how many samples away (1, 2, ...) the neighbours used in a fit around a sample are."""
     within_s, reach = 0.5 * window_s + _EDGE_S, 1
     while reach < len(time_s) - 1 and np.any(
         time_s[reach + 1 :] - time_s[: -reach - 1] <= within_s
@@ -107,14 +111,14 @@ def attitude_from_path(
     """
     yaw, pitch, roll = (np.empty(lat_deg.shape) for _ in range(3))
     moving = np.empty(lat_deg.shape, dtype=bool)
-    for part, inner, rows, offsets in blocks_of_path(time_s):
+    for part, inner, rows, offsets in overlapping_path_blocks(time_s):
         times, lat, lon = time_s[part], lat_deg[part], lon_deg[part]
         if velocity_enu_mps is None:
             velocity, acceleration = fit_path(times, lat, lon, alt_m[part], offsets=offsets)
         else:
             east, north, up = (along[part] for along in velocity_enu_mps)
             velocity = east, north, up
-            acceleration = _slope_of_velocity(times, lat, lon, velocity, offsets)
+            acceleration = _fit_acceleration(times, lat, lon, velocity, offsets)
         v_east, v_north, v_up = velocity
         if wind_east_north_mps != (0.0, 0.0):
             v_east, v_north = v_east - wind_east_north_mps[0], v_north - wind_east_north_mps[1]
@@ -129,11 +133,13 @@ def attitude_from_path(
     return _hold_yaw(yaw, moving), pitch, roll
 
 
-def _slope_of_velocity(
+def _fit_acceleration(
     time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, velocity: Vector,
     offsets: Sequence[int],
 ) -> Vector:  # fmt: skip
-    """Fit a straight line to velocities, each turned into the sample's own frame; its slope."""
+    """Return accelerations (m/s²): slopes of straight lines fitted to the velocities around each
+    sample, in its own local frame.
+    """
     east, north, _ = local_axes(lat_deg, lon_deg)
     x, y, z = (velocity[0] * e + velocity[1] * n for e, n in zip(east, north, strict=True))
     v_up = velocity[2]
@@ -145,10 +151,10 @@ def _slope_of_velocity(
             v_up[j] - v_up[i],
         )
 
-    return _fit(time_s, change, lat_deg.shape, offsets, degree=1)[0]
+    return _fit_derivatives(time_s, change, lat_deg.shape, offsets, degree=1)[0]
 
 
-def _fit(
+def _fit_derivatives(
     time_s: FloatArray,
     difference: Callable[[slice, slice], Vector],
     shape: tuple[int, ...],
@@ -156,7 +162,7 @@ def _fit(
     degree: int,
     window_s: float = WINDOW_S,
 ) -> tuple[Vector, Vector]:
-    """Fit a polynomial around each sample; returns first and second derivatives there.
+    """Fit a polynomial around each sample and return its first and its second derivatives there.
 
     The loop runs over offsets within the window, each as one array operation over all samples:
     no running sums over the file, whose rounding would grow with its length.
@@ -207,13 +213,15 @@ def _dot(a: Vector, j: slice, b: Vector, i: slice) -> FloatArray:
 
 
 def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
-    """Divide, giving 0 where there is nothing to divide by (a single sample)."""
+    """Return numerator / denominator, and 0 where the denominator is not above 0."""
     usable = denominator > 0.0
     return np.where(usable, numerator / np.where(usable, denominator, 1.0), 0.0)
 
 
 def _hold_yaw(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
-    """Return yaws in which samples without speed have that of the last sample that moves."""
+    """Return yaws in which samples that do not move have the yaw of the last moving sample before,
+    or else of the first moving one.
+    """
     if moving.all():
         return yaw
     index = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))
@@ -224,7 +232,7 @@ def _hold_yaw(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
 
 @dataclass(frozen=True)
 class Wind:
-    """A wind that is the same everywhere and always: where the air goes."""
+    """A wind that is the same everywhere and always: the air's velocity east and north."""
 
     east_mps: float
     north_mps: float
@@ -251,7 +259,7 @@ def scene_wind(weather: Any) -> Wind | None:
 def heading_and_airspeed(
     track_rad: FloatArray, ground_speed_mps: FloatArray, wind: Wind
 ) -> tuple[FloatArray, FloatArray]:
-    """Return heading (rad) and level airspeed (m/s) along a track over the ground.
+    """Return the heading (rad) and horizontal airspeed (m/s) for a track and speed in a wind.
 
     The velocity through the air is that over the ground less the wind; below 0.5 m/s of either,
     which point nowhere, the heading is the track.
@@ -264,7 +272,7 @@ def heading_and_airspeed(
 
 
 def ground_speed_mps(track_rad: float, airspeed_mps: float, wind: Wind) -> float:
-    """Return the ground speed along a track at an airspeed: the other side of the triangle.
+    """Return the ground speed (m/s) along a track at a given airspeed, by the wind triangle.
 
     tail + sqrt(airspeed² - cross²), with the wind's parts along and across the track.
     """
@@ -291,7 +299,7 @@ def attitude_in_wind(
     ground_speed: FloatArray,
     wind: Wind,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return yaw, pitch and roll in wind of an attitude that follows from the path over the ground.
+    """Return yaw, pitch and roll (rad) in wind, from an attitude derived from the ground path.
 
     That is heading, climb over the airspeed, and the bank for the part of the turn's acceleration
     that is across the nose. Where the ground speed (m/s) is NaN the attitude stays as it is.

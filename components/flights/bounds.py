@@ -21,7 +21,7 @@ from components.geometry import (
     line_of_sight,
     wrap_by_sines,
 )
-from components.geometry.error_bounds import true_reach_m
+from components.geometry.error_bounds import max_true_range_m
 from components.messages.reach import REACH_MARGIN, FarthestLook
 from components.terrain.raster import ElevationRaster
 from dsa_des.arrays.types import FloatArray
@@ -41,7 +41,8 @@ _POSITION_MARGIN_M = 1.0
 
 
 class OwnPath(NamedTuple):
-    """Where the ownship is at times of a run, how far from there at most until halfway to the next.
+    """The ownship's sampled positions over a run, and how far (m) it can be from one of them until
+    halfway to the next.
 
     `place` is latitude and longitude in degrees, and altitude in m.
     """
@@ -54,7 +55,7 @@ class OwnPath(NamedTuple):
 
 @dataclass(frozen=True)
 class TrafficEnvelope:
-    """What the targets that come in reach, and the ownship, can do over a run.
+    """Bounds over a run on the ownship's flight and on the targets that come within reach of it.
 
     Sizes of angles are the largest, elevations above the ownship's horizon; `range_m` is the
     longest line of sight within reach, 0 if no target ever comes in reach.
@@ -71,11 +72,11 @@ class TrafficEnvelope:
 
 
 def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) -> TrafficEnvelope:
-    """Bound a run's lines of sight up to a reach."""
-    times, half_s = _sample_instants(duration_s, len(fleet))
+    """Return bounds on the ownship's flight and on targets that may come within ``reach_m``."""
+    times, half_s = _midpoints_and_half_step_s(duration_s, len(fleet))
     own_state, states = own.at(times), fleet.at(times)
-    own_moves = _moves_m(own.max_speed_mps, half_s)
-    moves = _moves_m(fleet.max_speeds_mps, half_s)
+    own_moves = _max_distance_m(own.max_speed_mps, half_s)
+    moves = _max_distance_m(fleet.max_speeds_mps, half_s)
     _, elevation, range_m = line_of_sight(
         own_state.lat_deg[:, np.newaxis],
         own_state.lon_deg[:, np.newaxis],
@@ -87,7 +88,7 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
     )
     apart = moves + own_moves
     near = range_m - apart <= REACH_MARGIN * reach_m
-    latitudes, alt, turns = _place(own_state, own_moves)
+    latitudes, alt, turns = _position_bounds(own_state, own_moves)
     pitch, roll = attitude_extremes_rad(own)
     place = own_state.lat_deg, own_state.lon_deg, own_state.alt_m
     path = OwnPath(times, place, float(own_moves), half_s)
@@ -108,25 +109,27 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
     )
 
 
-def true_reaches_m(own: Fleet, targets: int, duration_s: float, look: FarthestLook) -> FloatArray:
-    """Return, for the ownship of each run, how far targets are at most that a look may meet.
+def max_true_ranges_m(
+    own: Fleet, targets: int, duration_s: float, look: FarthestLook
+) -> FloatArray:
+    """Return each run's largest true range (m) at which a sensor may still detect a target.
 
     That is its range, or what ranges by models of the Earth may truly be where this ownship flies;
     `targets` is how many there are in a run.
     """
     reaches_m: FloatArray = np.full(len(own), look.range_m)
     if look.seeming:
-        times, half_s = _sample_instants(duration_s, targets)
+        times, half_s = _midpoints_and_half_step_s(duration_s, targets)
         for run, speed_mps in enumerate(own.max_speeds_mps.tolist()):
             state = own.each(np.full(len(times), run), times)
-            latitudes, alt, _ = _place(state, _moves_m(speed_mps, half_s))
-            true_m = [true_reach_m(earth, m, latitudes, alt) for earth, m in look.seeming]
+            latitudes, alt, _ = _position_bounds(state, _max_distance_m(speed_mps, half_s))
+            true_m = [max_true_range_m(earth, m, latitudes, alt) for earth, m in look.seeming]
             reaches_m[run] = max(look.range_m, *true_m)
     return reaches_m
 
 
-def _sample_instants(duration_s: float, targets: int) -> tuple[FloatArray, float]:
-    """Return times in the middle of as many equal parts as are affordable, and half of one."""
+def _midpoints_and_half_step_s(duration_s: float, targets: int) -> tuple[FloatArray, float]:
+    """Return midpoints (s) of as many equal parts of a run as affordable, and half a part (s)."""
     count = min(duration_s / _SPACING_S, _MOST_CELLS / max(1, targets))
     intervals = max(1, math.ceil(count))
     half_s = 0.5 * duration_s / intervals
@@ -134,9 +137,9 @@ def _sample_instants(duration_s: float, targets: int) -> tuple[FloatArray, float
     return times, half_s
 
 
-def _place(state: TrajectoryState, moves_m: float) -> tuple[Interval, Interval, float]:
-    """Return the latitudes in degrees and altitudes of an ownship that is so far at most from
-    where samples saw it, and by what angle its normal turns meanwhile.
+def _position_bounds(state: TrajectoryState, moves_m: float) -> tuple[Interval, Interval, float]:
+    """Return the intervals of latitude (deg) and altitude (m) within ``moves_m`` of the ownship's
+    samples, and that distance as an angle (rad).
     """
     lowest = float(state.alt_m.min()) - moves_m
     # The normal turns fastest along the equator's meridian.
@@ -149,7 +152,7 @@ def _place(state: TrajectoryState, moves_m: float) -> tuple[Interval, Interval, 
 
 
 def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
-    """Return the largest sizes of pitch and roll over a flight; pi/2 and pi where not known."""
+    """Return a flight's largest absolute pitch and roll (rad); pi/2 and pi where not known."""
     if isinstance(trajectory, SampledTrajectory):
         # Between samples both change evenly, roll by the shorter way round.
         turned = np.diff(trajectory.roll_rad)
@@ -164,7 +167,7 @@ def attitude_extremes_rad(trajectory: Any) -> tuple[float, float]:
     return 0.5 * math.pi, math.pi
 
 
-def _moves_m(speed_mps: Any, half_s: float) -> Any:
+def _max_distance_m(speed_mps: Any, half_s: float) -> Any:
     return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M
 
 
@@ -174,7 +177,7 @@ def _states_each_second(own_at: FlightAt, duration_s: float) -> tuple[FloatArray
 
 
 def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -> None:
-    """Refuse terrain that the ownship does not fly above."""
+    """Raise ValueError if the ownship is not above the terrain, checked at each second."""
     times, state = _states_each_second(own_at, duration_s)
     hit = np.flatnonzero((state.alt_m <= terrain_m) & state.present)
     if len(hit):
@@ -188,14 +191,15 @@ def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -
 def check_on_raster(
     own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
-    """Refuse a raster over which the ownship never flies, or whose ground it flies through."""
+    """Raise ValueError if the ownship never is over the raster, or is once not above its ground."""
     times, state = _states_each_second(own_at, duration_s)
     there = np.flatnonzero(state.present)
-    ground, inside = raster.height(state.lat_deg[there], state.lon_deg[there])
+    ground, inside = raster.heights_and_coverage(state.lat_deg[there], state.lon_deg[there])
     if len(there) and not inside.any():
         first = there[0]
         raise ValueError(
-            f"[terrain] raster {raster.name} covers {raster.box()}: the ownship is at latitude "
+            f"[terrain] raster {raster.name} covers {raster.bounds_text()}: the ownship is at "
+            f"latitude "
             f"{state.lat_deg[first]:.6g}, longitude {state.lon_deg[first]:.6g} and never over it; "
             "they must overlap"
         )

@@ -24,7 +24,7 @@ _DIGITS = 9
 
 
 def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
-    """Return the times of some points of a regular grid that starts at 0, s.
+    """Return the times (s) of numbered points of a regular grid, whose point 0 is at 0 s.
 
     They are rounded to nanoseconds, so that 0.1 s steps read 99.6 and not 99.60000000000001.
     """
@@ -32,20 +32,20 @@ def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
 
 
 def regular_count(step_s: float, duration_s: float) -> int:
-    """Return how many points a regular grid over a duration has."""
+    """Return how many points 0, step, 2 step, ... lie within a duration."""
     return int(duration_s / step_s) + 1
 
 
 class SampleTimes(Protocol):
-    """Times in order, for each of many targets."""
+    """The ascending sample times of each of many targets."""
 
     def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
-        """Return the time (n,) of each target's sample of a number, s."""
+        """Return for each target the time (s) of its sample with the given number, shape (n,)."""
 
     def numbers_between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
-        """Return the numbers of the first and the last sample in [first_s, last_s], all (n,).
+        """Return each target's first and last sample number in [first_s, last_s], both (n,).
 
         Where there is none, the last is below the first.
         """
@@ -59,13 +59,13 @@ class RegularTimes:
     duration_s: float
 
     def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
-        """Return the time of each sample."""
+        """Return for each target the time (s) of its sample with the given number, shape (n,)."""
         return regular_times_s(self.step_s, number)
 
     def numbers_between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
-        """Return the numbers of the first and the last sample in each interval."""
+        """Return each target's first and last sample number in [first_s, last_s], both (n,)."""
         end = regular_count(self.step_s, self.duration_s) - 1
         guess = np.minimum(np.maximum(first_s, 0.0), self.duration_s) / self.step_s
         first = np.maximum(guess.astype(np.int64) - 1, 0)
@@ -79,20 +79,20 @@ class RegularTimes:
 
 
 class KnownTimes:
-    """Every target has times of its own (samples,), ascending; those of one alone are all's."""
+    """Sample times given singly, ascending for each target; those of only one hold for all."""
 
     def __init__(self, *times_s: FloatArray) -> None:
         self._find = PieceSearch.from_starts(times_s)
         self._of_each = np.asarray(len(times_s) > 1)
 
     def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
-        """Return the time of each sample."""
+        """Return for each target the time (s) of its sample with the given number, shape (n,)."""
         return self._find.starts_s[self._find.first[target * self._of_each] + number]
 
     def numbers_between(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
-        """Return the numbers of the first and the last sample in each interval."""
+        """Return each target's first and last sample number in [first_s, last_s], both (n,)."""
         of = target * self._of_each
         times_s, start = self._find.starts_s, self._find.first[of]
         first, last = self._find(of, first_s), self._find(of, last_s)
@@ -110,7 +110,7 @@ MOST_AT_ONCE = 32_768
 
 @dataclass(frozen=True, eq=False)
 class Approaches:
-    """The closest approach of each target: its time, and its slant range.
+    """The closest approach of each target to the ownship: its time (s) and its slant range (m).
 
     Where two are never there together at any of the times these are NaN and infinite.
     """
@@ -120,7 +120,7 @@ class Approaches:
 
     @classmethod
     def unknown(cls, targets: int) -> "Approaches":
-        """Return closest approaches at infinite range, before any time was compared."""
+        """Return approaches of that many targets before any comparison: ranges inf, times NaN."""
         return cls(np.full(targets, np.nan), np.full(targets, np.inf))
 
 
@@ -133,7 +133,7 @@ def closest_approaches(
     present_s: tuple[FloatArray, FloatArray],
     best: Approaches | None = None,
 ) -> Approaches:
-    """Find the time of the smallest slant range of each target; the first one of several.
+    """Return each target's smallest slant range to the ownship, and its earliest sample time.
 
     Flights are asked by `own_at` and `targets_at` of targets (n,), each at a time (n,) of its own;
     only times from `present_s[0]` to `present_s[1]` are looked at. What is known already, `best`,
@@ -152,7 +152,7 @@ def closest_approaches(
             target, first, last = (a[:MOST_AT_ONCE] for a in (target, first, last))
         middle = (first + last) // 2
         time_s = times.time_of(target, middle)
-        range_m, there = _slant_ranges(own_at(target, time_s), targets_at(target, time_s))
+        range_m, there = _ranges_and_presence(own_at(target, time_s), targets_at(target, time_s))
         _improve(best, target[there], time_s[there], range_m[there])
         away_s = np.maximum(
             time_s - times.time_of(target, first), times.time_of(target, last) - time_s
@@ -187,7 +187,7 @@ def refine_between_samples(
     present_s: tuple[FloatArray, FloatArray],
     best: Approaches,
 ) -> None:
-    """Improve closest approaches, in place, by what lies within a step (targets,) of their times.
+    """Refine closest approaches in place by times up to one step before and after each.
 
     The square of a distance is a parabola in time where both fly straight: the vertex is exact
     then, and is come nearer to in smaller steps where they turn. Flights are asked as by
@@ -200,7 +200,9 @@ def refine_between_samples(
             np.maximum(middle - reach, present_s[0][target]),
             np.minimum(middle + reach, present_s[1][target]),
         )
-        before, after = (_slant_ranges(own_at(target, t), targets_at(target, t))[0] for t in ends)
+        before, after = (
+            _ranges_and_presence(own_at(target, t), targets_at(target, t))[0] for t in ends
+        )
         square = best.range_m[target] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
             rising = (square - before**2) / (middle - ends[0])
@@ -210,13 +212,13 @@ def refine_between_samples(
         some = np.flatnonzero(np.isfinite(vertex) & (bend > 0.0))
         time_s = np.round(np.clip(vertex, *ends)[some], _DIGITS)
         here = target[some]
-        range_m, there = _slant_ranges(own_at(here, time_s), targets_at(here, time_s))
+        range_m, there = _ranges_and_presence(own_at(here, time_s), targets_at(here, time_s))
         nearer = there & (range_m < best.range_m[here] - _NEARER_M)
         best.range_m[here[nearer]], best.time_s[here[nearer]] = range_m[nearer], time_s[nearer]
 
 
-def _slant_ranges(own: Any, other: Any) -> tuple[FloatArray, Any]:
-    """Return slant ranges between two states, and whether both are there."""
+def _ranges_and_presence(own: Any, other: Any) -> tuple[FloatArray, Any]:
+    """Return the slant ranges (m) between two states, and a mask, True if both are present."""
     range_m = slant_range_m(
         own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
     )
@@ -224,7 +226,7 @@ def _slant_ranges(own: Any, other: Any) -> tuple[FloatArray, Any]:
 
 
 def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: FloatArray) -> None:
-    """Update the closest approaches where a new range is smaller, or as small and earlier."""
+    """Update ``best`` in place where a new range is smaller, or as small and earlier."""
     maybe = range_m <= best.range_m[target]
     target, time_s, range_m = target[maybe], time_s[maybe], range_m[maybe]
     order = np.lexsort((time_s, range_m, target))
@@ -237,24 +239,24 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
     best.time_s[target[one]] = time_s[one]
 
 
-def censored_approaches(
+def censoring_ends(
     own: Trajectory,
     targets: Fleet,
     compared_at: Sequence[SampleTimes],
     time_s: FloatArray,
     end_s: float,
 ) -> list[str]:
-    """Return for each closest approach whether it lies at an end of the compared times."""
+    """Return in words at which end of the times each closest approach lies; empty if at neither."""
     present_s = np.array(present_together_s(own, targets.intervals_present_s, end_s))
     looked_s = np.array(_sample_span_s(compared_at, *present_s))
     return [
-        end_of_look(time, looked_s[:, number], present_s[:, number], end_s)
+        censoring_end(time, looked_s[:, number], present_s[:, number], end_s)
         for number, time in enumerate(time_s.tolist())
     ]
 
 
-def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
-    """Return which end of the compared times a closest approach lies at, or an empty string."""
+def censoring_end(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
+    """Return in words at which end of the times a closest approach lies; empty if at neither."""
     if time_s <= looked_s[0]:
         return "the start of its flight" if present_s[0] > 0.0 else "the start"
     if time_s >= looked_s[1]:
@@ -265,7 +267,7 @@ def end_of_look(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_
 def present_together_s(
     own: Any, intervals_s: FloatArray, end_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the first and the last time (targets,) of a run at which both may be there, s."""
+    """Return the first and last time (s) at which each target and the ownship may be present."""
     first, last = own.interval_present()
     return (
         np.maximum(intervals_s[:, 0], max(first, 0.0)),
@@ -276,7 +278,7 @@ def present_together_s(
 def _sample_span_s(
     compared_at: Sequence[SampleTimes], begin_s: FloatArray, end_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the first and the last sample (targets,) in [begin_s, end_s]; NaN without any."""
+    """Return the times (s) of each target's first and last sample in [begin_s, end_s], or NaN."""
     first, last = np.full(len(begin_s), np.nan), np.full(len(begin_s), np.nan)
     for times in compared_at:
         targets = np.arange(len(begin_s))
@@ -290,7 +292,7 @@ def _sample_span_s(
 def approaches_of_run(
     own: Trajectory, targets: Fleet, times: Sequence[SampleTimes], end_s: float, *, between: bool
 ) -> Approaches:
-    """Return how near targets come over a run, compared at some times, and `between` them too."""
+    """Return closest approaches at the sample times and, with ``between``, between them."""
     best, speeds = Approaches.unknown(len(targets)), targets.max_speeds_mps
     present_s = present_together_s(own, targets.intervals_present_s, end_s)
     flights = (lambda _, time_s: own.at(time_s)), targets.each

@@ -22,7 +22,7 @@ _ROUNDS = 6
 
 @dataclass(frozen=True)
 class Approach:
-    """What two aircraft do at their closest approach; arrays (2, encounters), the ownship's first.
+    """Two aircraft's motion at closest approach; arrays are (2, encounters), the ownship first.
 
     The position is the ownship's, altitude alone counts. Miss distances (encounters,): to the
     right of the intruder's relative way where positive, seen from above; intruder above ownship.
@@ -39,13 +39,13 @@ class Approach:
     sense: str = "slant"
 
 
-def intruder_heading(
+def intruder_headings(
     own_heading_rad: FloatArray,
     own_speed: FloatArray,
     intruder_speed: FloatArray,
     bearing_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return both headings with which an intruder comes from a bearing; NaN where there is none.
+    """Return both headings (rad) in which an intruder can close in from a bearing, or NaN.
 
     The bearing is that of the line on which it closes in, clockwise from the ownship's nose, rad.
     """
@@ -62,8 +62,11 @@ def intruder_heading(
     return headings[0], headings[1]
 
 
-def solve(approach: Approach) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return where the intruders are at the closest approach, and which can be there.
+def solve_intruder_positions(
+    approach: Approach,
+) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
+    """Return the intruders' latitudes, longitudes (deg) and altitudes (m) at the closest approach,
+    and a mask of encounters that are possible.
 
     One that climbs or sinks too fast past so small a distance, or does not move against the
     ownship, cannot be closest there.
@@ -85,17 +88,19 @@ def solve(approach: Approach) -> tuple[FloatArray, FloatArray, FloatArray, BoolA
     side = np.where(a.horizontal_m < 0.0, 1.0, -1.0)
     angle = np.arctan2(east, north) + side * off
     for _ in range(_ROUNDS):
-        lat, lon, altitude = _place_paths(a, angle)
+        lat, lon, altitude = _intruder_positions_at_angle(a, angle)
         value = _range_times_rate(a, lat, lon, altitude)
         # The derivative in the plane: Newton on the angle converges at once.
         slope = distance * (east * np.cos(angle) - north * np.sin(angle))
         step = np.where(possible & (np.abs(slope) > 0.0), value / np.where(slope, slope, 1.0), 0.0)
         angle = angle - step
-    lat, lon, altitude = _place_paths(a, angle)
+    lat, lon, altitude = _intruder_positions_at_angle(a, angle)
     return lat, lon, altitude, possible
 
 
-def _place_paths(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _intruder_positions_at_angle(
+    a: Approach, angle: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
     distance = np.abs(a.horizontal_m)
     altitude = a.altitude_m[0] + a.vertical_m
     up = a.vertical_m.copy()
@@ -111,7 +116,9 @@ def _place_paths(a: Approach, angle: FloatArray) -> tuple[FloatArray, FloatArray
 def _range_times_rate(
     a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray
 ) -> FloatArray:
-    """Return Δr · Δv, in the level plane only where that is the sense."""
+    """Return the dot product of relative position and relative velocity, of their horizontal parts
+    alone if ``sense`` is horizontal.
+    """
     own_lat, own_lon = np.full_like(lat, a.lat_deg), np.full_like(lat, a.lon_deg)
     n, e, d = line_of_sight_ned(own_lat, own_lon, a.altitude_m[0], lat, lon, altitude)
     own, other = local_axes(own_lat, own_lon), local_axes(lat, lon)
@@ -132,9 +139,11 @@ def _range_times_rate(
 def fly_paths(
     approach: Approach, closest_s: FloatArray, time_s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, BoolArray]:
-    """Return both flights over time, shape (2, n, instants), and which encounters there are."""
+    """Return latitudes, longitudes (deg) and altitudes (m) of both flights, each (2, n, instants),
+    and a mask of encounters that are possible.
+    """
     a = approach
-    lat, lon, altitude, possible = solve(a)
+    lat, lon, altitude, possible = solve_intruder_positions(a)
     paths = []
     for k, (at_lat, at_lon, at_alt) in enumerate(
         (
@@ -152,7 +161,7 @@ def fly_paths(
     return lats, lons, alts, possible
 
 
-def project_to_plane(
+def project_to_north_east_m(
     lat_deg: FloatArray, lon_deg: FloatArray, reference_deg: tuple[float, float]
 ) -> tuple[FloatArray, FloatArray]:
     """Return north and east (m) of points in the plane that touches the ellipsoid at a reference.

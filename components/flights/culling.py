@@ -27,7 +27,7 @@ _MOST_PIECES_PER_TARGET = 100
 
 @dataclass(frozen=True, eq=False)
 class NearIntervals:
-    """Intervals (n,) of time in which targets may be near; outside them they are surely not.
+    """The time intervals (n,) outside of which a target surely is not near the ownship.
 
     Targets ascend; both ends are included, and those of one target are in order and apart.
     """
@@ -37,7 +37,7 @@ class NearIntervals:
     end_s: FloatArray
 
     def may_be_near(self, columns: IntArray, time_s: FloatArray, lasts_s: float) -> BoolArray:
-        """Return which targets may be near during looks from times on, (rows, targets).
+        """Return a mask (rows, targets), True if possibly near in the look from the row's time.
 
         `columns` are those of `targets_near` all of these looks: which of them are near at which
         one does not depend on the window.
@@ -64,7 +64,7 @@ class NearIntervals:
         return np.unique(self.target[met])
 
     def holds(self, target: IntArray, time_s: FloatArray, until_s: FloatArray) -> BoolArray:
-        """Return whether each of some targets (n,) may be near at some time of its own look."""
+        """Return a mask (n,), True if a target may be near from its ``time_s`` to ``until_s``."""
         first = np.searchsorted(self.target, target)
         count = np.searchsorted(self.target, target, side="right") - first
         inside: BoolArray = np.zeros(len(target), dtype=bool)
@@ -85,7 +85,7 @@ class NearIntervals:
 def near_intervals(
     own: Fleet, targets: Fleet, reach_m: float | FloatArray, end_s: float
 ) -> NearIntervals:
-    """Return when targets may be within a range of the ownship, between time 0 and an end.
+    """Return the intervals in which each target may be within ``reach_m`` of its run's ownship.
 
     Every time at which a target is within `reach_m` lies in one of its intervals; they exceed the
     true ones by `FINEST_S` or less at each end (more only for a target that stays for long within a
@@ -128,7 +128,7 @@ def near_intervals(
 
 
 def _has_too_many(run: IntArray, of_run: int) -> BoolArray:
-    """Return for each piece whether its run has become too many of them."""
+    """Return a mask over pieces of time, True where the run has more pieces than the limit."""
     too_many: BoolArray = 2 * np.bincount(run) > _MOST_PIECES_PER_TARGET * of_run
     return too_many[run]
 
@@ -154,7 +154,7 @@ _OWN_SPEED_MARGIN = 1.05
 
 
 class SteeredCulling:
-    """The targets near ownships that are steered, one in each run, by epochs of time.
+    """Tells which targets may be near steered ownships, one per run, once in each epoch of time.
 
     `own` flies as before it is steered; `targets` are as many in each run, one run after the other;
     nothing is asked about after `end_s`.
@@ -165,7 +165,9 @@ class SteeredCulling:
         self._reach_m, self._end_s = reach_m, end_s
         runs = len(own), len(targets) // len(own)
         self._targets_mps: FloatArray = targets.max_speeds_mps.reshape(runs)
-        fastest = self._closing_mps(self._targets_mps, self._own_mps).max(axis=1, initial=1e-3)
+        fastest = self._closing_speed_bounds_mps(self._targets_mps, self._own_mps).max(
+            axis=1, initial=1e-3
+        )
         #: How long an epoch lasts around each ownship.
         self.epoch_s: FloatArray = np.maximum(SHORTEST_EPOCH_S, _DRIFT_SHARE * reach_m / fastest)
         # Ranges and positions of targets as epochs begin, and of which epochs they are known, each
@@ -176,26 +178,26 @@ class SteeredCulling:
         self._position: FloatArray = np.empty((3, *self._range_m.shape))
 
     @staticmethod
-    def _closing_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
-        """Return how fast ownships (n,) and targets (n, targets) can come nearer to each other."""
+    def _closing_speed_bounds_mps(targets_mps: FloatArray, own_mps: FloatArray) -> FloatArray:
+        """Return the largest closing speeds (n, targets) of ownships (n,) and their targets."""
         return np.asarray(
             (targets_mps + own_mps[:, np.newaxis] * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
         )
 
     def forget(self, run: int, time_s: float) -> None:
-        """Discard what is known of a run's ownship after a time, as it steers from then on."""
+        """Discard a run's stored ranges from the time from which its ownship is steered."""
         known = self._known[0, run]
         known[known * self.epoch_s[run] >= time_s] = -1
 
     def states_and_near(
         self, own: SteeredFleet, run: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, BoolArray]:
-        """Return the states of ownships as they are steered by now at each row, and which targets
-        may be in reach, (rows, targets); rows are in order of run.
+        """Return the ownships' states at each row with the steering so far, and a mask (rows,
+        targets), True where a target may be within reach.
         """
         rows = len(time_s)
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
-        fastest = np.maximum(own.largest_speed(run, time_s), self._own_mps[run])
+        fastest = np.maximum(own.largest_manoeuvre_speed_mps(run, time_s), self._own_mps[run])
         begins = np.ones(len(run), dtype=bool)
         begins[1:] = (run[1:] != run[:-1]) | (epoch[1:] != epoch[:-1])
         begins[1:] |= fastest[1:] != fastest[:-1]
@@ -212,13 +214,15 @@ class SteeredCulling:
             range_m[new] = slant_range_m(*at_start, *self._epoch_positions(begun, number[new]))
             self._known[0, begun, index[new]] = number[new]
             self._range_m[begun, index[new]] = range_m[new]
-        closing = self._closing_mps(self._targets_mps[of], fastest[first])
+        closing = self._closing_speed_bounds_mps(self._targets_mps[of], fastest[first])
         within_m = self._reach_m + closing * self.epoch_s[of][:, np.newaxis] + _RANGE_MARGIN_M
         near = np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
         return TrajectoryState(*(values[:rows] for values in here)), near
 
     def _epoch_positions(self, run: IntArray, epoch: IntArray) -> FloatArray:
-        """Return the positions (3, n, targets) of the targets of runs as epochs (n,) begin."""
+        """Return the positions (3, n, targets) of each run's targets at the start of its epoch,
+        computing what is not stored yet.
+        """
         _, _, room, width = self._position.shape
         position, left = np.empty((3, len(run), width)), np.arange(len(run))
         while len(left):
@@ -227,11 +231,11 @@ class SteeredCulling:
             position[:, left[known]] = self._position[:, of[known], index[known]]
             left = left[~known]
             if len(left):
-                self._move_targets(run[left], epoch[left])
+                self._store_target_positions(run[left], epoch[left])
         return position
 
-    def _move_targets(self, run: IntArray, epoch: IntArray) -> None:
-        """Learn where targets are from the first epoch of each run on, as many as there is room."""
+    def _store_target_positions(self, run: IntArray, epoch: IntArray) -> None:
+        """Compute and store the runs' targets at the first given epoch and as many as fit after."""
         of, first = np.unique(run, return_index=True)
         _, _, room, width = self._position.shape
         number = epoch[first, np.newaxis] + np.arange(room)

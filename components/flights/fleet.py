@@ -30,46 +30,48 @@ class Trajectory(Protocol):
         """Largest speed along its path."""
 
     def interval_present(self) -> tuple[float, float]:
-        """Return the first and the last time at which it is there."""
+        """Return the first and the last time (s) at which the aircraft is present."""
 
     def at(self, time_s: Any) -> TrajectoryState:
-        """Return its state at some times."""
+        """Return the aircraft's state at the given times (s)."""
 
 
 class Fleet(Sequence[Any]):
-    """The flights of many aircraft, each to the bit as it would be alone; an item is one flight."""
+    """The flights of many aircraft, evaluated together, equal to the bit to each alone; an item is
+    a single flight.
+    """
 
     @cached_property
     def max_speeds_mps(self) -> FloatArray:
-        """Largest speed of each along its path, shape (flights,)."""
+        """Largest speed (m/s) of each flight along its path, shape (flights,)."""
         return np.array([flight.max_speed_mps for flight in self], dtype=np.float64)
 
     @cached_property
     def intervals_present_s(self) -> FloatArray:
-        """First and last time at which each is there, shape (flights, 2)."""
+        """First and last time (s) at which each flight is present, shape (flights, 2)."""
         intervals = [flight.interval_present() for flight in self]
         return np.array(intervals, dtype=np.float64).reshape(-1, 2)
 
     @abstractmethod
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of flights (n,), each at a time (n,) of its own, in s."""
+        """Return the states (n,) of the given flights, each at its own time (s)."""
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        """Return flights' ground speeds (m/s), each at its own time; NaN if no script sets it."""
         return np.full(len(time_s), np.nan)
 
     def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        """Return flights' fixed yaw, pitch, roll (3, n), each at its time; NaN where not fixed."""
         return np.full((3, len(time_s)), np.nan)
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Return the states of all at times (n,), shape (n, flights)."""
+        """Return the states of all flights at the given times, shape (times, flights)."""
         times, count = check_times(time_s), len(self)
         aircraft = np.tile(np.arange(count), len(times))
         return self.each(aircraft, np.repeat(times, count)).reshape((len(times), count))
 
     def subset(self, columns: IntArray) -> Fleet:
-        """Return the fleet of some flights, given by their indices, ascending."""
+        """Return a fleet of the flights with the given indices, which ascend."""
         return type(self)([self[i] for i in columns.tolist()])  # type: ignore[call-arg]
 
 
@@ -78,7 +80,7 @@ def evaluate_in_blocks(
     aircraft: IntArray,
     time_s: FloatArray,
 ) -> TrajectoryState:
-    """Evaluate pairs of aircraft and time, a cache's worth at a time."""
+    """Evaluate states of aircraft and time pairs in blocks that fit the cache, and join them."""
     blocks = [
         state(aircraft[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE])
         for first in range(0, len(aircraft), CELLS_AT_ONCE)
@@ -92,7 +94,7 @@ def evaluate_in_blocks(
 
 
 def check_times(time_s: npt.ArrayLike) -> FloatArray:
-    """Return times as an array of one axis."""
+    """Return times as a float array; ValueError if it does not have exactly one axis."""
     times = np.asarray(time_s, dtype=np.float64, order="C")
     if times.ndim != 1:
         raise ValueError(f"time_s has shape {times.shape}: it must have one axis")
@@ -100,14 +102,14 @@ def check_times(time_s: npt.ArrayLike) -> FloatArray:
 
 
 def empty_state(rows: int, columns: int) -> TrajectoryState:
-    """Return arrays to be filled with states."""
+    """Return a state of uninitialized arrays of shape (rows, columns), to be filled."""
     shape = (rows, columns)
     lat, lon, alt, yaw, pitch, roll = (np.empty(shape) for _ in range(6))
     return TrajectoryState(lat, lon, alt, yaw, pitch, roll, np.empty(shape, dtype=bool))
 
 
 def assemble_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -> TrajectoryState:
-    """Return states (n,) put together, those of each part in the rows that it has."""
+    """Return the states of all parts as one, each part's states at the rows given for it."""
     if not states:
         return empty_state(1, 0).reshape((0,))
     order = np.argsort(np.concatenate(rows), kind="stable")
@@ -120,7 +122,7 @@ _FEW_STEPS = 3
 
 
 class PieceSearch(Growing):
-    """The pieces of many paths, laid end to end."""
+    """Finds a path's piece at a time, for many paths with pieces stored one after the other."""
 
     def __init__(self, starts_s: FloatArray, counts: IntArray) -> None:
         ends = np.cumsum(counts)
@@ -131,7 +133,7 @@ class PieceSearch(Growing):
         self._per_s = self._pieces_per_second(counts) if self._steps > _FEW_STEPS else None
 
     def _pieces_per_second(self, counts: IntArray) -> FloatArray | None:
-        """Return how many pieces start in a second of each path; None where they do not evenly."""
+        """Return each path's pieces per second, or None if any path's are not evenly spaced."""
         begin, end = self.starts_s[self.first], self.starts_s[self.last]
         if not (begin < end).all():
             return None
@@ -142,14 +144,14 @@ class PieceSearch(Growing):
 
     @classmethod
     def from_starts(cls, starts_s: Sequence[FloatArray]) -> PieceSearch:
-        """Return the search among the pieces of each."""
+        """Return a search among several paths' pieces, given each path's start times (s)."""
         counts = np.array([len(starts) for starts in starts_s], dtype=np.int64)
         return cls(np.concatenate([*starts_s, np.empty(0)]), counts)
 
     def with_paths(self, more: PieceSearch) -> PieceSearch:
-        """Return the search among these and more paths at their end."""
+        """Return a search in which the paths of another one follow after these."""
         before = len(self.starts_s)
-        both = self.with_more(
+        both = self.with_appended(
             starts_s=more.starts_s, first=more.first + before, last=more.last + before
         )
         both._steps, both._per_s = max(self._steps, more._steps), None
@@ -174,7 +176,7 @@ class PieceSearch(Growing):
 
 
 class LoneFlight(Fleet):
-    """A flight of a kind that no fleet is made for."""
+    """A fleet of one flight, for types of flight that have no fleet class of their own."""
 
     def __init__(self, flight: Any) -> None:
         self._flight = flight
@@ -186,13 +188,13 @@ class LoneFlight(Fleet):
         return (self._flight,)[index]
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return its states at times (n,), in s."""
+        """Return the states (n,) of the only flight at the given times (s)."""
         state: TrajectoryState = self._flight.at(time_s)
         return state
 
 
 class MixedFleet(Fleet):
-    """Flights of several kinds, a fleet of each; `makers` make one of flights of a type."""
+    """Flights of several types, kept in one fleet for each type, which ``makers`` build."""
 
     def __init__(
         self, flights: Sequence[Any], makers: Mapping[type, Callable[[Sequence[Any]], Fleet]]
@@ -217,8 +219,8 @@ class MixedFleet(Fleet):
     def __getitem__(self, index: int) -> Any:  # type: ignore[override]
         return self._flights[index]
 
-    def _parts(self, aircraft: IntArray) -> list[tuple[Fleet, IntArray, IntArray]]:
-        """Return each fleet that is asked, in which rows, and for which of its flights."""
+    def _split_by_fleet(self, aircraft: IntArray) -> list[tuple[Fleet, IntArray, IntArray]]:
+        """Return for each fleet concerned: itself, the asking rows, and its flights' indices."""
         fleet = self._fleet[aircraft]
         asked = np.flatnonzero(np.bincount(fleet, minlength=1)).tolist()
         rows = [np.flatnonzero(fleet == number) for number in asked]
@@ -228,29 +230,29 @@ class MixedFleet(Fleet):
         ]
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of flights (n,), each at a time (n,) of its own, in s."""
-        parts = self._parts(aircraft)
+        """Return the states (n,) of the given flights, each at its own time (s)."""
+        parts = self._split_by_fleet(aircraft)
         states = [fleet.each(index, time_s[row]) for fleet, row, index in parts]
         return assemble_rows([row for _, row, _ in parts], states)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        """Return flights' ground speeds (m/s), each at its own time; NaN if no script sets it."""
         speed_mps = super().ground_speeds_mps(aircraft, time_s)
-        for fleet, row, index in self._parts(aircraft):
+        for fleet, row, index in self._split_by_fleet(aircraft):
             speed_mps[row] = fleet.ground_speeds_mps(index, time_s[row])
         return speed_mps
 
     def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        """Return flights' fixed yaw, pitch, roll (3, n), each at its time; NaN where not fixed."""
         fixed_rad = super().fixed_attitudes_rad(aircraft, time_s)
-        for fleet, row, index in self._parts(aircraft):
+        for fleet, row, index in self._split_by_fleet(aircraft):
             fixed_rad[:, row] = fleet.fixed_attitudes_rad(index, time_s[row])
         return fixed_rad
 
 
 @dataclass(frozen=True, eq=False)
 class FormulaGroup:
-    """Flights of one leg each that share a formula: one array expression."""
+    """Single-leg flights that share one formula of motion, evaluated as one array expression."""
 
     formula: Callable[[FloatArray, FloatArray], tuple[FloatArray, ...]]
     columns: IntArray
@@ -260,7 +262,7 @@ class FormulaGroup:
     yaw_is_fixed: BoolArray
 
     def at(self, times: FloatArray) -> TrajectoryState:
-        """Return the group's states, (times, flights); angles that never change, once for all."""
+        """Return states, shape (times, flights); values that never change take one row's memory."""
         start_s, end_s, until_s = self.times_s
         shape = len(times), len(start_s)
         moving: list[FloatArray] = []

@@ -44,7 +44,7 @@ _INVERSE_TERMS, _LONGITUDE_TERMS = 5, 3
 def geodesic_parameters(
     lat_deg: Any, lon_deg: Any, alt_m: Any, azimuth_rad: Any, speed_mps: Any, climb_mps: Any
 ) -> FloatArray:
-    """Prepare a straight leg (rows,), or many (rows, n), each to the bit as it would be alone.
+    """Return the parameters of a straight leg along a geodesic, (rows,), or of many, (rows, n).
 
     The series are those of C. F. F. Karney, "Algorithms for geodesics", Journal of Geodesy 87
     (2013), eqs 15-18, 21, 24 and 25, to the fifth order: below 4 nm on WGS-84. Functions whose last
@@ -53,23 +53,28 @@ def geodesic_parameters(
     n = FLATTENING / (2.0 - FLATTENING)
     semi_minor = SEMI_MAJOR_AXIS_M * (1.0 - FLATTENING)
     # The cosine from the distance to the pole in degrees, which is exact, keeps its digits there.
-    sin_beta = (1.0 - FLATTENING) * each(math.sin, each(math.radians, lat_deg))
-    cos_beta = each(math.sin, each(math.radians, 90.0 - abs(lat_deg)))
-    length = each(math.hypot, sin_beta, cos_beta)
+    sin_beta = (1.0 - FLATTENING) * apply_elementwise(
+        math.sin, apply_elementwise(math.radians, lat_deg)
+    )
+    cos_beta = apply_elementwise(math.sin, apply_elementwise(math.radians, 90.0 - abs(lat_deg)))
+    length = apply_elementwise(math.hypot, sin_beta, cos_beta)
     # At the very pole every meridian starts; a tiny cosine keeps the one that was asked for.
-    sin_beta, cos_beta = sin_beta / length, each(_avoid_zero, cos_beta / length)
-    sin_az, cos_az = each(math.sin, azimuth_rad), each(math.cos, azimuth_rad)
+    sin_beta, cos_beta = sin_beta / length, apply_elementwise(_avoid_zero, cos_beta / length)
+    sin_az, cos_az = (
+        apply_elementwise(math.sin, azimuth_rad),
+        apply_elementwise(math.cos, azimuth_rad),
+    )
     sin_az0 = sin_az * cos_beta
-    cos_az0 = each(math.hypot, cos_az, sin_az * sin_beta)
+    cos_az0 = apply_elementwise(math.hypot, cos_az, sin_az * sin_beta)
     along = cos_az * cos_beta
-    sigma1 = each(_arc, sin_beta, along, sin_beta, cos_az)
+    sigma1 = apply_elementwise(_angle_from_node, sin_beta, along, sin_beta, cos_az)
     # Not by the sine and cosine of sigma1: near a pole they have lost the longitude.
-    omega1 = each(_arc, sin_az0 * sin_beta, along, sin_beta, cos_az)
+    omega1 = apply_elementwise(_angle_from_node, sin_az0 * sin_beta, along, sin_beta, cos_az)
     k2 = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARED) * cos_az0 * cos_az0
-    eps = k2 / (2.0 * (1.0 + each(math.sqrt, 1.0 + k2)) + k2)
+    eps = k2 / (2.0 * (1.0 + apply_elementwise(math.sqrt, 1.0 + k2)) + k2)
     a1, c1, c1_inverse = _distance_series(eps)
     a3, c3 = _longitude_series(eps, n)
-    sines = [each(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
+    sines = [apply_elementwise(math.sin, 2 * (j + 1) * sigma1) for j in range(len(c1))]
     lon_slope = FLATTENING * sin_az0 * a3
     # Radius of curvature along the heading (Euler): what turns metres aloft into metres below.
     meridian, prime_vertical = radii_of_curvature(lat_deg)
@@ -81,15 +86,15 @@ def geodesic_parameters(
     table[_TAU], table[_PER_METRE] = sigma1 + _sum_products(c1, sines), 1.0 / (semi_minor * a1)
     table[_SIN_AZ0], table[_COS_AZ0] = sin_az0, cos_az0
     i3 = sigma1 + _sum_products(c3, sines)
-    table[_LON_RAD] = each(math.radians, lon_deg) - omega1 + lon_slope * i3
+    table[_LON_RAD] = apply_elementwise(math.radians, lon_deg) - omega1 + lon_slope * i3
     table[_LON_SLOPE], table[_SIGMA], table[_RADIUS] = lon_slope, sigma1, radius
     table[_INVERSE : _INVERSE + _INVERSE_TERMS] = c1_inverse
     table[_LONGITUDE : _LONGITUDE + _LONGITUDE_TERMS] = c3[:_LONGITUDE_TERMS]
     return table
 
 
-def each(function: Callable[..., float], *values: Any) -> Any:
-    """Return a function of numbers, or of each of the numbers in arrays."""
+def apply_elementwise(function: Callable[..., float], *values: Any) -> Any:
+    """Return the function's value for numbers, or for arrays its value for each element."""
     if not isinstance(values[0], np.ndarray):
         return function(*values)
     columns = (value.tolist() for value in values)
@@ -100,18 +105,18 @@ def _avoid_zero(cosine: float) -> float:
     return max(cosine, 1e-100)
 
 
-def _arc(y: float, x: float, sin_beta: float, cos_az: float) -> float:
-    """Return an angle from the node of the geodesic; at the equator heading east there is none."""
+def _angle_from_node(y: float, x: float, sin_beta: float, cos_az: float) -> float:
+    """Return atan2(y, x), an angle from the geodesic's node; 0 along the equator, without node."""
     return math.atan2(y, x) if sin_beta or cos_az else 0.0
 
 
 def power(base: Any, exponent: int) -> Any:
-    """Return a power as Python takes it, also of each value of an array: NumPy's differs."""
-    return each(lambda value: value**exponent, base)
+    """Return numbers to an integer power, rounded as Python does and NumPy does not."""
+    return apply_elementwise(lambda value: value**exponent, base)
 
 
 def _sum_products(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
-    """Return the sum of products, from the first to the last (`sum` rounds in ways of its own)."""
+    """Return the sum of factor times sine, added from first to last so it always rounds alike."""
     total = factors[0] * sines[0]
     for factor, sine in zip(factors[1:], sines[1:], strict=False):
         total = total + factor * sine
@@ -121,19 +126,19 @@ def _sum_products(factors: Sequence[Any], sines: Sequence[Any]) -> Any:
 def flight_time_s(
     distance_m: float, speed_mps: float, alt_m: float, end_alt_m: float, radius_m: float
 ) -> float:
-    """Find how long a straight leg over a distance on the ellipsoid takes at an altitude."""
+    """Return how long (s) a straight leg on the ellipsoid takes, at the mean of its altitudes."""
     return distance_m * (radius_m + 0.5 * (alt_m + end_alt_m)) / (speed_mps * radius_m)
 
 
 def leg_radius_m(parameters: FloatArray) -> float:
-    """Return the radius of curvature that a leg's parameters were made with."""
+    """Return the radius of curvature (m) that is stored in a straight leg's parameters."""
     return float(parameters[_RADIUS])
 
 
 def geodesic_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate straight legs."""
+    """Return latitude, longitude (deg), altitude (m), yaw (rad) on straight legs at times (s)."""
     # Worked out in place: with a dozen arrays in flight less, the rest stays in the cache.
     # Flights that all keep their altitude have one row of them for all times.
     climbed = table[_CLIMB] * (elapsed if np.count_nonzero(table[_CLIMB]) else elapsed[:1])
@@ -174,7 +179,8 @@ def geodesic_state(
 def _advance_angle(
     sine: FloatArray, cosine: FloatArray, delta: FloatArray, spare: FloatArray
 ) -> None:
-    """Turn a sine and cosine on by a small angle (below 9e-4), in place; overwrites all.
+    """Advance a sine and cosine in place by a small angle (below 9e-4 rad); ``delta`` and ``spare``
+    are overwritten.
 
     The small angle's own sine and cosine are series to its fifth power; then the addition theorem.
     """
@@ -204,7 +210,7 @@ def _sine_series(
     cosine: FloatArray,
     spare: FloatArray,
 ) -> FloatArray:
-    """Sum c_j sin(2 j x) by Clenshaw's recurrence, given the sine and cosine of x."""
+    """Return the sum of c_j sin(2 j x) by Clenshaw's recurrence, from the sine and cosine of x."""
     two_cos = cosine - sine
     two_cos *= 2.0
     two_cos *= np.add(cosine, sine, out=spare)

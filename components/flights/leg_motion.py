@@ -10,7 +10,7 @@ import numpy as np
 from geographiclib.geodesic import Geodesic
 
 from components.flights.fleet import evaluate_in_blocks
-from components.flights.geodesic_motion import each, geodesic_state, power
+from components.flights.geodesic_motion import apply_elementwise, geodesic_state, power
 from components.geometry import (
     ECCENTRICITY_SQUARED,
     TWO_PI,
@@ -49,8 +49,7 @@ def turn_parameters(
     climb_mps: Any,
     rate_rad_s: Any,
 ) -> FloatArray:
-    """Prepare a turn (rows,), or many (rows, n), each to the bit as it would be alone: everything
-    that does not depend on time.
+    """Return the precomputed parameters of a turn, shape (rows,), or of many turns, (rows, n).
 
     The circle lies around its own centre in the chart (east, north) -> (angle about the centre's
     prime-vertical and meridian radii), so it is round in metres although the ellipsoid's two
@@ -65,20 +64,22 @@ def turn_parameters(
             f"{math.degrees(rad_s):g} deg/s): it must not exceed {LARGEST_TURN_RADIUS_M:g}; "
             "use a straight leg or waypoints"
         )
-    circle = _circles if isinstance(radius, np.ndarray) else _circle
+    circle = _turn_tables if isinstance(radius, np.ndarray) else _turn_table
     table = circle(lat_deg, lon_deg, alt_m, azimuth_rad, radius, rate_rad_s, climb_mps)
     # The circle in the chart is off the azimuth by some 1e-8 to 1e-6 rad, which turns in a row
     # would add up: it is begun as much the other way.
     yaw = turn_state(table, np.zeros(np.size(radius)))[3]
-    off_rad = each(_short_way, (yaw if circle is _circles else float(yaw[0])) - azimuth_rad)
+    off_rad = apply_elementwise(
+        _wrap_to_half_turn_rad, (yaw if circle is _turn_tables else float(yaw[0])) - azimuth_rad
+    )
     return circle(lat_deg, lon_deg, alt_m, azimuth_rad - off_rad, radius, rate_rad_s, climb_mps)
 
 
-def _short_way(angle_rad: float) -> float:
+def _wrap_to_half_turn_rad(angle_rad: float) -> float:
     return math.remainder(angle_rad, 2.0 * math.pi)
 
 
-def _circle(
+def _turn_table(
     lat_deg: float,
     lon_deg: float,
     alt_m: float,
@@ -87,7 +88,7 @@ def _circle(
     rate_rad_s: float,
     climb_mps: float,
 ) -> FloatArray:
-    """Return the table of a circle whose centre lies abeam of an azimuth."""
+    """Return the parameter table of a turn on a circle whose centre lies abeam of the azimuth."""
     meridian, prime_vertical = radii_of_curvature(lat_deg)
     side = math.copysign(0.5 * math.pi, rate_rad_s)
     # Metres aloft to metres on the ellipsoid, along the line to the centre (abeam).
@@ -116,7 +117,7 @@ def _circle(
     return table
 
 
-def _circles(
+def _turn_tables(
     lat_deg: FloatArray,
     lon_deg: FloatArray,
     alt_m: FloatArray,
@@ -125,13 +126,13 @@ def _circles(
     rate_rad_s: FloatArray,
     climb_mps: FloatArray,
 ) -> FloatArray:
-    """Return the tables of many, to the bit; a single one takes half the time by itself."""
+    """Return many turns' parameter tables (rows, n), equal to the bit to those made singly."""
     meridian, prime_vertical = radii_of_curvature(lat_deg)
     side = np.copysign(0.5 * math.pi, rate_rad_s)
     # Metres aloft to metres on the ellipsoid, along the line to the centre (abeam).
-    cos2, sin2 = (power(each(of, azimuth_rad), 2) for of in (math.sin, math.cos))
+    cos2, sin2 = (power(apply_elementwise(of, azimuth_rad), 2) for of in (math.sin, math.cos))
     abeam = 1.0 / (cos2 / meridian + sin2 / prime_vertical)
-    ways = each(math.degrees, azimuth_rad + side), radius * abeam / (abeam + alt_m)
+    ways = apply_elementwise(math.degrees, azimuth_rad + side), radius * abeam / (abeam + alt_m)
     places = zip(*(value.tolist() for value in (lat_deg, lon_deg, *ways)), strict=True)
     centres = [Geodesic.WGS84.Direct(*place) for place in places]
     c_lat, c_lon = (np.array([one[name] for one in centres]) for name in ("lat2", "lon2"))
@@ -143,24 +144,27 @@ def _circles(
     ).T
     c_meridian, c_prime_vertical = radii_of_curvature(c_lat)
     per_east, per_north = 1.0 / (c_prime_vertical + alt_m), 1.0 / (c_meridian + alt_m)
-    stretch = each(_stretch, each(math.hypot, east, north), up)
+    stretch = apply_elementwise(_arc_per_chord, apply_elementwise(math.hypot, east, north), up)
     x, y = east * stretch / per_east, north * stretch / per_north
     table = np.empty((TURN_ROWS, len(lat_deg)))
     table[_EAST : _UP + 3] = axes.reshape(9, -1)
     table[_PER_EAST], table[_PER_NORTH] = per_east, per_north
-    table[_RADIUS], table[_PHASE] = each(math.hypot, x, y), each(math.atan2, x, y)
+    table[_RADIUS], table[_PHASE] = (
+        apply_elementwise(math.hypot, x, y),
+        apply_elementwise(math.atan2, x, y),
+    )
     table[_RATE], table[_ALT], table[_CLIMB] = rate_rad_s, alt_m, climb_mps
     return table
 
 
-def _stretch(chord: float, up: float) -> float:
+def _arc_per_chord(chord: float, up: float) -> float:
     return math.atan2(chord, up) / chord if chord else 1.0
 
 
 def turn_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate turns."""
+    """Return latitude, longitude (deg), altitude (m) and yaw (rad) on turns after times (s)."""
     angle = table[_PHASE] + table[_RATE] * elapsed
     sine, cosine = np.sin(angle), np.cos(angle)
     # Offsets from the centre as angles, and their derivatives by `angle`.
@@ -173,17 +177,19 @@ def turn_state(
         -table[_RADIUS] * sine * table[_PER_NORTH],
     )
     rho = np.sqrt(east * east + north * north)
-    lat, lon, to_east, to_north = _offsets_to_angles(table, (east, north), (d_east, d_north), rho)
+    lat, lon, to_east, to_north = _position_and_direction(
+        table, (east, north), (d_east, d_north), rho
+    )
     direction = np.where(table[_RATE] + 0.0 * rho > 0.0, 1.0, -1.0)
     yaw = wrap_heading_rad(np.arctan2(to_east * direction, to_north * direction))
     return lat, lon, table[_ALT] + table[_CLIMB] * elapsed, yaw
 
 
-def _offsets_to_angles(
+def _position_and_direction(
     table: FloatArray, offset: Pair, motion: Pair, rho: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return latitude and longitude (deg) of offsets from a place, as angles, and the direction of
-    motions east and north there; `rho` is how far off they are, above 0.
+    """Return latitude and longitude (deg) at angular offsets from a place, and the east and north
+    parts of the motion there, up to a common factor.
     """
     (east, north), (d_east, d_north) = offset, motion
     sin_rho, cos_rho = np.sin(rho), np.cos(rho)
@@ -226,7 +232,8 @@ def ramp_parameters(
     wanted_mps: Pair,
     acceleration_mps2: FloatArray,
 ) -> FloatArray:
-    """Prepare ramps (rows, n): from velocities (east, north) straight to others, then on at these.
+    """Return the precomputed parameters (rows, n) of ramps: level flights whose velocity (east,
+    north) changes steadily to the wanted one and then stays.
 
     `position` is latitude and longitude (deg) and altitude (m), (n,) each.
     """
@@ -244,7 +251,7 @@ def ramp_parameters(
 
 
 def ramp_velocity(table: FloatArray, elapsed: FloatArray) -> Pair:
-    """Return the velocity east and north, m/s, in the axes of where a ramp begins."""
+    """Return ramps' velocities (m/s) east and north after times (s), in each one's start axes."""
     gone = np.minimum(elapsed, table[_LASTS])
     return (
         table[_FROM_EAST] + table[_MORE_EAST] * gone,
@@ -255,7 +262,8 @@ def ramp_velocity(table: FloatArray, elapsed: FloatArray) -> Pair:
 def ramp_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate ramps: level flight whose velocity changes steadily at first.
+    """Return latitude, longitude (deg), altitude (m) and yaw (rad) on ramps (level, velocity
+    changing steadily at first) after the elapsed times (s).
 
     The way is v t + a (T t - T²/2) with T the time gone of the change, along an arc with the radii
     of where it begins: over 10 km it keeps its length to 0.5 m.
@@ -269,7 +277,7 @@ def ramp_state(
     velocity = ramp_velocity(table, elapsed)
     motion = velocity[0] * table[_PER_EAST], velocity[1] * table[_PER_NORTH]
     rho = np.maximum(np.hypot(*offset), _LEAST_ANGLE)
-    lat, lon, to_east, to_north = _offsets_to_angles(table, offset, motion, rho)
+    lat, lon, to_east, to_north = _position_and_direction(table, offset, motion, rho)
     nose = np.where(np.hypot(*velocity) > _STANDS_MPS, np.arctan2(to_east, to_north), table[_NOSE])
     return lat, lon, table[_LEVEL] + 0.0 * elapsed, wrap_heading_rad(nose)
 
@@ -279,9 +287,8 @@ Kind = Literal["geodesic", "turn", "hold", "ramp"]
 
 @dataclass(frozen=True)
 class Segment:
-    """One leg, ready to be evaluated: its formula's table, from when on since the start of the
-    flight, and the attitude that follows from the motion; its speed is along the path, climb
-    included.
+    """One leg ready to be evaluated: its formula's parameters, its start (s) since the flight's
+    start, its pitch and roll, and its speed along the path.
 
     A "ramp" is level, from one velocity to another (`ramp_parameters`), with its largest speed.
     A "hold" stays in one position, and may climb and turn on the spot; the rows of its table are
@@ -299,7 +306,9 @@ class Segment:
 def hold_state(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Evaluate aircraft that stay in one position; see `Segment` for the table's rows."""
+    """Return latitude, longitude (deg), altitude (m) and yaw (rad) of aircraft that stay in one
+    position; the table's rows are listed at `Segment`.
+    """
     zero = np.zeros_like(elapsed)
     # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
     yaw = remainder(table[4] + table[5] * elapsed, TWO_PI)
@@ -313,7 +322,7 @@ KINDS: tuple[Kind, ...] = ("geodesic", "turn", "hold", "ramp")
 
 
 class Ramps(Growing):
-    """Flights of one ramp each, from when on, s, by the table of `ramp_parameters`.
+    """Flights of a single ramp each, by start time (s) and the `ramp_parameters` table.
 
     They fly as scripts of one such leg, of which only what differs is held: every multirotor of a
     fleet begins one in every second.
@@ -325,44 +334,44 @@ class Ramps(Growing):
         self._tables = GrowingArray(np.asfortranarray(table))
 
     def with_flights(self, ramps: Ramps) -> Ramps:
-        """Return these and more ramps at their end."""
+        """Return a collection of these ramps followed by more ramps."""
         if not len(self):  # nothing says there how the rows lie in memory
             return ramps
-        fleet = self.with_more(_start_s=ramps._start_s, max_speeds_mps=ramps.max_speeds_mps)
-        fleet._tables = self._tables.with_more(ramps._tables.values)
+        fleet = self.with_appended(_start_s=ramps._start_s, max_speeds_mps=ramps.max_speeds_mps)
+        fleet._tables = self._tables.with_appended(ramps._tables.values)
         return fleet
 
     def __len__(self) -> int:
         return len(self._start_s)
 
     def segment(self, ramp: int) -> tuple[Segment, float]:
-        """Return a ramp as a leg, and when it begins, s."""
+        """Return a ramp as a leg, and the time (s) at which it begins."""
         table = self._tables.values[:, ramp].copy()
         fastest_mps = float(self.max_speeds_mps[ramp])
         return Segment("ramp", 0.0, table, 0.0, 0.0, fastest_mps), float(self._start_s[ramp])
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of ramps (n,), each at a time (n,) of its own, in s."""
+        """Return the states (n,) of the given ramps, each at its own time (s)."""
         return evaluate_in_blocks(self._state, aircraft, time_s)
 
     def velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return velocities east and north (2, n), asked for as in `each`."""
-        return np.stack(ramp_velocity(*self._at(aircraft, time_s)[:2]))
+        """Return ramps' velocities (2, n) to the east and north (m/s), each at its own time (s)."""
+        return np.stack(ramp_velocity(*self._tables_and_elapsed(aircraft, time_s)[:2]))
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return speeds over ground, asked for as in `each`."""
+        """Return the ground speeds (m/s) of the given ramps, each at its own time (s)."""
         return np.asarray(np.hypot(*self.velocities_mps(aircraft, time_s)))
 
-    def _at(
+    def _tables_and_elapsed(
         self, aircraft: IntArray, time_s: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return tables (rows, n), for how long the ramps are flown, s, and when they begin, s."""
+        """Return ramps' tables (rows, n), times (s) since their starts, and start times (s)."""
         table = np.ascontiguousarray(self._tables.values.T.take(aircraft, axis=0).T)
         start_s = self._start_s.take(aircraft)
         elapsed = np.minimum(np.maximum(time_s, start_s), start_s + LONGEST_FLIGHT_S) - start_s
         return table, elapsed, start_s
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        table, elapsed, start_s = self._at(aircraft, time_s)
+        table, elapsed, start_s = self._tables_and_elapsed(aircraft, time_s)
         level = np.zeros(len(elapsed))
         return TrajectoryState(*ramp_state(table, elapsed), level, level, time_s >= start_s)

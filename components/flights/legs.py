@@ -90,7 +90,7 @@ class Climb(Leg):
 
 
 class Stationary(Leg):
-    """Stay in place, keeping the heading; the next leg flies on at the speed before it."""
+    """Stay in place, keeping the heading; the next leg flies on at the speed before this one."""
 
     kind: Literal["stationary"] = "stationary"
 
@@ -140,7 +140,7 @@ Position = tuple[float, float, float]
 
 
 class LegBuilder:
-    """Flies the script once, leg by leg, noting where each leg starts."""
+    """Turns a script of legs into segments in order, tracking position, heading and time."""
 
     def __init__(
         self,
@@ -161,7 +161,7 @@ class LegBuilder:
         """Return the segments; the last one never ends."""
         for number, leg in enumerate(legs):
             try:
-                duration = self._fly(leg)
+                duration = self._add_leg(leg)
                 if duration is None and number < len(legs) - 1:
                     raise ValueError(
                         "duration_s is None: it must be given, only the last leg may go on for ever"
@@ -169,15 +169,15 @@ class LegBuilder:
             except ValueError as error:
                 raise ValueError(f"{self.name}: legs[{number}] ({leg.kind}): {error}") from error
         if not legs:
-            self._straight(self.climb, None)
+            self._add_straight(self.climb, None)
         elif isinstance(legs[-1], Waypoints) or getattr(legs[-1], "to_alt_m", None) is not None:
-            self._straight(0.0, None)
+            self._add_straight(0.0, None)
         return self.segments
 
-    def _fly(self, leg: AnyLeg) -> float | None:
-        """Add a leg's segments; returns how long they last, None for ever."""
+    def _add_leg(self, leg: AnyLeg) -> float | None:
+        """Append a leg's segments; returns its duration (s), 0 for waypoints, None if endless."""
         if isinstance(leg, Stationary):
-            return self._hold(0.0, 0.0, leg.duration_s)
+            return self._add_hold(0.0, 0.0, leg.duration_s)
         if leg.speed_mps is not None:
             self.speed = leg.speed_mps
         if isinstance(leg, Waypoints):
@@ -186,12 +186,12 @@ class LegBuilder:
             return 0.0
         climb = self.climb if leg.climb_mps is None else leg.climb_mps
         if isinstance(leg, Turn):
-            return self._turn(leg, climb)
+            return self._add_turn(leg, climb)
         if isinstance(leg, Climb):
-            return self._straight(climb, self._time_to_climb(leg, climb))
+            return self._add_straight(climb, self._time_to_climb(leg, climb))
         if leg.heading_deg is not None:
             self.heading = heading_from_deg(leg.heading_deg)
-        return self._straight(climb, leg.duration_s)
+        return self._add_straight(climb, leg.duration_s)
 
     def _time_to_climb(self, leg: Climb, climb: float) -> float | None:
         if leg.to_alt_m is None:
@@ -206,17 +206,17 @@ class LegBuilder:
             )
         return rise / climb
 
-    def _straight(self, climb: float, duration: float | None) -> float | None:
+    def _add_straight(self, climb: float, duration: float | None) -> float | None:
         if self.speed == 0.0:
-            return self._hold(climb, 0.0, duration)
+            return self._add_hold(climb, 0.0, duration)
         table = geodesic_parameters(*self.position, self.heading, self.speed, climb)
-        return self._add("geodesic", table, duration, math.atan2(climb, self.speed), 0.0)
+        return self._add_segment("geodesic", table, duration, math.atan2(climb, self.speed), 0.0)
 
-    def _hold(self, climb: float, rate: float, duration: float | None) -> float | None:
+    def _add_hold(self, climb: float, rate: float, duration: float | None) -> float | None:
         table = np.array([*self.position, climb, self.heading, rate])
-        return self._add("hold", table, duration, 0.0, 0.0)
+        return self._add_segment("hold", table, duration, 0.0, 0.0)
 
-    def _turn(self, leg: Turn, climb: float) -> float | None:
+    def _add_turn(self, leg: Turn, climb: float) -> float | None:
         if leg.radius_m is not None:
             rate = self.speed / leg.radius_m
             if rate == 0.0:
@@ -227,10 +227,10 @@ class LegBuilder:
         if leg.angle_deg is not None:
             duration = math.radians(leg.angle_deg) / abs(rate)
         if self.speed == 0.0:
-            return self._hold(climb, rate, duration)
+            return self._add_hold(climb, rate, duration)
         table = turn_parameters(*self.position, self.heading, self.speed, climb, rate)
         bank = math.atan2(self.speed * rate, STANDARD_GRAVITY_M_S2)
-        return self._add("turn", table, duration, math.atan2(climb, self.speed), bank)
+        return self._add_segment("turn", table, duration, math.atan2(climb, self.speed), bank)
 
     def _add_waypoint(self, point: Waypoint) -> None:
         if point.speed_mps is not None:
@@ -252,11 +252,13 @@ class LegBuilder:
         self.heading = heading_from_deg(line["azi1"])
         level = geodesic_parameters(*self.position, self.heading, self.speed, 0.0)
         duration = flight_time_s(distance, self.speed, self.position[2], alt, leg_radius_m(level))
-        self._straight(rise / duration, duration)
+        self._add_straight(rise / duration, duration)
         self.position = (lat, lon, alt)
 
     def _position_of(self, point: Waypoint) -> Position:
-        """Find a waypoint's geodetic position; an altitude left out is the one before."""
+        """Return a waypoint's latitude, longitude (deg) and altitude (m); without an altitude of
+        its own it has the one before.
+        """
         before = self.position[2]
         if point.lat_deg is not None and point.lon_deg is not None:
             return point.lat_deg, point.lon_deg, before if point.alt_m is None else point.alt_m
@@ -270,7 +272,7 @@ class LegBuilder:
         )
         return float(lat), float(lon), before if point.up_m is None else float(alt)
 
-    def _add(
+    def _add_segment(
         self, kind: Kind, table: FloatArray, duration: float | None, pitch: float, roll: float
     ) -> float | None:
         """Append a segment and move the builder to its end."""
@@ -290,10 +292,10 @@ class LegBuilder:
         return duration
 
 
-def fly_each(
+def segments_of_each(
     start: Sequence[FloatArray], heading_rad: FloatArray, legs: Sequence[Sequence[Straight | Turn]]
 ) -> list[list[Segment]]:
-    """Return the segments of flights from positions (n,) on, as a `LegBuilder` would of each.
+    """Return the segments of several flights from their starts (n,), as `LegBuilder` makes them.
 
     Every leg has its speed and its climb, and every turn its rate.
     """

@@ -15,7 +15,12 @@ from components.flights.geodesic_motion import geodesic_parameters
 from components.flights.leg_motion import KINDS, RAMP_ROWS, Ramps, ramp_parameters
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedFleet, ScriptedTrajectory
-from components.flights.steering_plan import SteeredPart, chords, steered_parts, times_around_s
+from components.flights.steering_plan import (
+    SteeredPart,
+    displacements_around,
+    steered_parts,
+    times_around_s,
+)
 from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.growing_arrays import Growing
@@ -35,7 +40,7 @@ def straight_fleet(
     end_time_s: FloatArray,
     fixed_deg: FloatArray,
 ) -> ScriptedFleet:
-    """Return straight flights of columns (flights,), prepared together where all of them move.
+    """Return a fleet of straight flights, one for each entry of the columns (flights,).
 
     Units are those of `ScriptedTrajectory`, which says what is wrong with one; `fixed_deg`
     (3, flights) is yaw, pitch and roll, NaN where they follow from the motion.
@@ -87,7 +92,7 @@ Parts = tuple[tuple[float, ScriptedTrajectory], ...]
 
 
 class SteeredFleet(Growing, Fleet):
-    """Ownships, each with its own flight, and after manoeuvres with what each of them led to.
+    """The ownships of several runs: each one's own flight, and what it flies after manoeuvres.
 
     A manoeuvre replaces only its own part: a climb lets a turn in progress go on, and a turn a
     climb. The flight's own script ends with the first one. A fleet never changes:
@@ -121,7 +126,7 @@ class SteeredFleet(Growing, Fleet):
 
     @property
     def nominal(self) -> Fleet:
-        """The flights without any manoeuvre."""
+        """The ownships' flights as they would be without any manoeuvre."""
         return self._flights
 
     def __len__(self) -> int:
@@ -131,7 +136,7 @@ class SteeredFleet(Growing, Fleet):
         return SteeredFlight(self._flights[ownship], self, ownship)
 
     def parts_of(self, ownship: int) -> Parts:
-        """Return the parts of an ownship's flight after its manoeuvres."""
+        """Return an ownship's parts after its manoeuvres, each with the time (s) of its start."""
         count = int(self.manoeuvre_count[ownship])
         starts_s, numbers = self._start_s[ownship, :count], self._part[ownship, :count]
         return tuple(zip(starts_s.tolist(), map(self._flight_of, numbers.tolist()), strict=True))
@@ -144,7 +149,7 @@ class SteeredFleet(Growing, Fleet):
         return flown
 
     def subset(self, columns: IntArray) -> SteeredFleet:
-        """Return the fleet of some flights, in any order, without preparing them anew."""
+        """Return a fleet of the flights at some indices, sharing all parts computed already."""
         if np.array_equal(columns, np.arange(len(self))):
             return self
         flights = self._flights
@@ -158,7 +163,7 @@ class SteeredFleet(Growing, Fleet):
         return some
 
     def part(self, flights: slice, nominal: Fleet) -> SteeredFleet:
-        """Return the fleet of some flights in their order, which `nominal` are without any."""
+        """Return a fleet of a slice of the flights; ``nominal`` are these without manoeuvres."""
         some = copy(self)
         some.__dict__.pop("max_speeds_mps", None)
         some._flights, some._alone, some._written = nominal, None, [-1]
@@ -169,21 +174,21 @@ class SteeredFleet(Growing, Fleet):
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> TrajectoryState:
-        """Return the states of ownships (n,), each at a time (n,) of its own, in s, by the first
-        `known` of their manoeuvres, or all.
+        """Return the states (n,) of the given ownships, each at its own time (s), flown by the
+        first ``known`` of their manoeuvres or by all.
         """
         own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
         if not len(after):
             return self._states_before_steering(aircraft, time_s)
-        steered = self._steered_at(which, time_s[after])
+        steered = self._states_of_parts(which, time_s[after])
         if not len(own):
             return steered
         return assemble_rows(
             [own, after], [self._states_before_steering(aircraft[own], time_s[own]), steered]
         )
 
-    def _steered_at(self, which: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of some parts."""
+    def _states_of_parts(self, which: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return states (n,) of flown parts, each at its time (s); numbers below 0 mean ramps."""
         scripts, ramps = (which >= 0).nonzero()[0], (which < 0).nonzero()[0]
         if not len(ramps):
             return self._parts.each(which, time_s)
@@ -194,7 +199,7 @@ class SteeredFleet(Growing, Fleet):
         return assemble_rows([scripts, ramps], [others, on_ramps])
 
     def _states_before_steering(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states before any manoeuvre."""
+        """Return the states (n,) of the given ownships by their flights without any manoeuvre."""
         if self._alone is None:
             return self._flights.each(aircraft, time_s)
         state: TrajectoryState = self._alone.at(time_s)
@@ -203,7 +208,9 @@ class SteeredFleet(Growing, Fleet):
     def _split_by_manoeuvre(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None
     ) -> tuple[IntArray, IntArray, IntArray]:
-        """Return which (n,) are before their first manoeuvre, which after, and in which part."""
+        """Return the indices of rows before their ownship's first manoeuvre, those of rows after
+        it, and the number of the part flown in the latter.
+        """
         if not len(self._flown) and not len(self._ramps):
             return np.arange(len(time_s)), _NOBODY, _NOBODY
         count = self.manoeuvre_count.take(aircraft)
@@ -233,13 +240,16 @@ class SteeredFleet(Growing, Fleet):
         """Largest speed of each along its path as it is now, shape (flights,)."""
         every = np.arange(len(self))
         return np.maximum(
-            self._flights.max_speeds_mps, self.largest_speed(every, np.full(len(self), inf))
+            self._flights.max_speeds_mps,
+            self.largest_manoeuvre_speed_mps(every, np.full(len(self), inf)),
         )
 
     def ground_speeds_mps(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> FloatArray:
-        """Return the speeds over ground of ownships, asked for as in `each`."""
+        """Return the ground speeds (m/s) of the given ownships, each at its own time, flown by the
+        first ``known`` of their manoeuvres or by all.
+        """
         own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
         speed_mps = np.empty(len(time_s))
         speed_mps[own] = self._flights.ground_speeds_mps(aircraft[own], time_s[own])
@@ -252,14 +262,16 @@ class SteeredFleet(Growing, Fleet):
     def fixed_attitudes_rad(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> FloatArray:
-        """Return fixed angles (3, n) as the flights have them until they are steered."""
+        """Return the fixed yaw, pitch and roll (3, n) of the given ownships, each at its own time;
+        NaN where not fixed or after a manoeuvre.
+        """
         own, _, _ = self._split_by_manoeuvre(aircraft, time_s, known)
         fixed_rad = np.full((3, len(time_s)), np.nan)
         fixed_rad[:, own] = self._flights.fixed_attitudes_rad(aircraft[own], time_s[own])
         return fixed_rad
 
-    def largest_speed(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return the largest speed of any manoeuvre begun by ownships (n,) by times (n,), or 0."""
+    def largest_manoeuvre_speed_mps(self, ownship: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return ownships' largest speed (m/s) in manoeuvres begun by their time, 0 without any."""
         parts = int(self.manoeuvre_count.max(initial=0))
         if not parts:
             return np.zeros(len(ownship))
@@ -276,8 +288,8 @@ class SteeredFleet(Growing, Fleet):
         time_s: FloatArray,
         manoeuvres: Sequence[Manoeuvre] | FloatArray,
     ) -> SteeredFleet:
-        """Return the flights with manoeuvres of ownships (each once) from times on, none before
-        an earlier one, beside what they still do.
+        """Return a new fleet in which ownships (each at most once) fly manoeuvres from the given
+        times on, beside what they still fly of earlier ones.
 
         A turn or a change of altitude begins and ends at once, without a change of speed along the
         path's projection and without acceleration upward; speeds change steadily. A velocity is
@@ -291,7 +303,7 @@ class SteeredFleet(Growing, Fleet):
                 ownship[mine], time_s[mine], ~(len(self._ramps) + np.arange(len(mine)))
             )
             fleet._ramps = self._ramps.with_flights(
-                self._fly_ramps(ownship[mine], time_s[mine], given[mine])
+                self._ramps_to_commanded(ownship[mine], time_s[mine], given[mine])
             )
             if not len(others):
                 return fleet
@@ -304,16 +316,18 @@ class SteeredFleet(Growing, Fleet):
         flown = steered_parts("ownship", around, time_s, every, before)
         fleet = self._append_parts(ownship, time_s, len(self._flown) + np.arange(len(flown)))
         fleet._parts = self._parts.with_flights(ScriptedFleet(flown))
-        return fleet.with_more(_flown=np.array(flown, dtype=object))
+        return fleet.with_appended(_flown=np.array(flown, dtype=object))
 
     def _states_around(self, ownship: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return where ownships are around times (n,), as at `times_around_s`, (n, 3)."""
+        """Return ownships' states (n, 3) shortly before, at and after times (`times_around_s`)."""
         times_s = times_around_s(time_s)
         around = self.each(np.repeat(ownship, times_s.shape[1]), times_s.reshape(-1))
         return around.reshape(times_s.shape)
 
-    def _fly_ramps(self, ownship: IntArray, time_s: FloatArray, given: FloatArray) -> Ramps:
-        """Return what ownships fly from their velocities at times (n,) to commanded ones."""
+    def _ramps_to_commanded(
+        self, ownship: IntArray, time_s: FloatArray, given: FloatArray
+    ) -> Ramps:
+        """Return the ramps from ownships' velocities at their times to the commanded ones."""
         _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)
         at_s, scripts, ramps = time_s[after], which >= 0, which < 0
@@ -325,7 +339,7 @@ class SteeredFleet(Growing, Fleet):
         rest = np.isnan(velocity[0]).nonzero()[0]
         if len(rest):
             around = self._states_around(ownship[rest], time_s[rest])
-            north_m, east_m, base_s = np.array(chords(around, time_s[rest])).T
+            north_m, east_m, base_s = np.array(displacements_around(around, time_s[rest])).T
             velocity[:, rest] = east_m / base_s, north_m / base_s
         east, north, acceleration = (given[:, place] for place in _VELOCITY)
         table = ramp_parameters(
@@ -336,7 +350,7 @@ class SteeredFleet(Growing, Fleet):
         return Ramps(time_s, table, fastest)
 
     def _append_parts(self, ownship: IntArray, time_s: FloatArray, part: IntArray) -> SteeredFleet:
-        """Return the flights with a new part of each of some ownships from times on."""
+        """Return a new fleet in which each of some ownships flies a further part from its time."""
         fleet = copy(self)
         fleet.__dict__.pop("max_speeds_mps", None)
         index = self.manoeuvre_count[ownship]
@@ -364,7 +378,7 @@ _NOBODY: IntArray = np.empty(0, dtype=np.int64)
 
 
 class SteeredFlight:
-    """One of the flights of a `SteeredFleet`; of a flight alone a fleet is made."""
+    """One flight of a `SteeredFleet`; for a flight given alone a fleet of one is made."""
 
     def __init__(
         self, flight: Trajectory, fleet: SteeredFleet | None = None, number: int = 0
@@ -375,20 +389,20 @@ class SteeredFlight:
 
     @property
     def parts(self) -> Parts:
-        """Return the flown path after manoeuvres, with the time (s) from which each part holds."""
+        """Return the parts flown after manoeuvres, each with the time (s) from which it holds."""
         return self._fleet.parts_of(self._number)
 
     @property
     def max_speed_mps(self) -> float:
-        """Largest speed along the path as it is now."""
+        """Largest speed (m/s) along the path, with the manoeuvres so far."""
         return float(self._fleet.max_speeds_mps[self._number])
 
     def interval_present(self) -> tuple[float, float]:
-        """Return from when to when it is there: from 0 on, as what is flown has no end."""
+        """Return the flight's first and last time (s): 0 and infinity, as it has no end."""
         return 0.0, inf
 
     def add_manoeuvre(self, time_s: float, manoeuvre: Manoeuvre) -> SteeredFlight:
-        """Return the flight with a manoeuvre from a time on; see `SteeredFleet.add_manoeuvres`."""
+        """Return a new flight, steered from a time on; see `SteeredFleet.add_manoeuvres`."""
         fleet = self._fleet.add_manoeuvres(
             np.array([self._number]), np.array([time_s]), [manoeuvre]
         )
@@ -417,7 +431,7 @@ _FLEETS: dict[type, Callable[[Sequence[Any]], Fleet]] = {
 
 
 def fleet_of(flights: Sequence[Any]) -> Fleet:
-    """Return flights of any kinds as a fleet."""
+    """Return flights as a fleet: of their type's class if all share one type, else a mixed one."""
     kinds = {type(flight) for flight in flights}
     kind = next(iter(kinds), ScriptedTrajectory)
     return (

@@ -44,7 +44,8 @@ Rates = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class FlownTracks:
-    """Flights of many tracks, (instants, tracks), `step_s` apart from 0 on, from where they begin.
+    """Many tracks flown side by side, arrays (instants, tracks) ``step_s`` apart from 0 s on; north
+    and east are counted from each track's start.
 
     Up is the altitude, speed the true airspeed; headings are clockwise from north.
     """
@@ -68,7 +69,7 @@ def fly_euler(
     turn_rad_s: FloatArray,
     start_heading_rad: FloatArray | float = 0.0,
 ) -> FlownTracks:
-    """Fly by steps of 1 s that take the values of the second before on their right.
+    """Fly tracks by Euler steps of 1 s, each with the values at its beginning, and return them.
 
     h += ḣ; N, E += v (cos ψ, sin ψ); v += a; ψ += ψ̇. The path over the ground is that of the
     airspeed, as in the published tracks.
@@ -172,7 +173,7 @@ def eased_turn_rates(
     most_rad_s: float,
     eases_rad: float,
 ) -> Rates:
-    """Return the rates of a turn to a heading, step by step.
+    """Return an eased turn to a heading as (duration in s, rate in deg/s) of each step.
 
     Once a second the pilot commands a rate in proportion to what was left to turn a second ago
     (`left_before_rad`, positive to the right as `left_rad` is), up to the largest; within
@@ -198,11 +199,11 @@ def eased_turn_rates(
             left_rad -= STEP_S * rate_rad_s
         if max(abs(left_rad), abs(left_before_rad), abs(rate_rad_s)) < _ALMOST_RAD:
             break
-    return _flyable([*rates, (STEP_S, math.degrees(left_rad) / STEP_S)])
+    return _without_slow_turns([*rates, (STEP_S, math.degrees(left_rad) / STEP_S)])
 
 
-def _flyable(rates: Iterable[tuple[float, float]]) -> Rates:
-    """Return rates without turns slower than flights can have.
+def _without_slow_turns(rates: Iterable[tuple[float, float]]) -> Rates:
+    """Return turn rates with too slow turns replaced by slowest turns and straight flight.
 
     What is turned more slowly is turned at that rate in a part of the time, up to a second of it
     together, and the rest is flown straight.

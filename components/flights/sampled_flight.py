@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.flights.attitude import attitude_from_path, blocks_of_path, fit_path
+from components.flights.attitude import attitude_from_path, fit_path, overlapping_path_blocks
 from components.flights.fleet import (
     CELLS_AT_ONCE,
     Fleet,
@@ -127,7 +127,7 @@ class SampledTrajectory:
     def _attitude(
         self, path: tuple[FloatArray, ...], wind_east_north_mps: tuple[float, float]
     ) -> tuple[FloatArray, ...]:
-        """Return yaw, pitch and roll along a path, of each piece between gaps by itself."""
+        """Return yaw, pitch and roll (rad) of a path, derived singly for pieces between gaps."""
         ends = [] if self.away is None else (np.flatnonzero(self.away) + 1).tolist()
         pieces = []
         for first, end in pairwise([0, *ends, len(path[0])]):
@@ -155,7 +155,7 @@ class SampledTrajectory:
 
     @cached_property
     def coefficients(self) -> FloatArray:
-        """Each segment's polynomials, (25, samples)."""
+        """Each segment's polynomial coefficients, (rows, samples), as `fit_segments` makes them."""
         return fit_segments(
             self.sample_times_s,
             (self.lat_deg, self.lon_deg, self.alt_m),
@@ -164,7 +164,7 @@ class SampledTrajectory:
         )
 
     @classmethod
-    def make_all(
+    def from_common_times(
         cls,
         names: Sequence[str],
         time_s: FloatArray,
@@ -173,7 +173,7 @@ class SampledTrajectory:
         alt_m: FloatArray,
         place: tuple[FloatArray, int] | None = None,
     ) -> list[SampledTrajectory]:
-        """Return aircraft that are known at the same times, as each would be made alone.
+        """Return a flight for each name, all sampled at the same times, as if made one by one.
 
         Their coefficients go to a table that is given, from a row on, or to one of their own.
         """
@@ -225,7 +225,7 @@ class SampledTrajectory:
     def in_air(
         self, east_mps: float, north_mps: float, alt_m: FloatArray | None = None
     ) -> SampledTrajectory:
-        """Return the same flight with what was derived of its attitude derived with a wind.
+        """Return the same flight with its path-derived attitude angles derived anew in a wind.
 
         With `alt_m` it is at these altitudes.
         """
@@ -276,22 +276,22 @@ class SampledTrajectory:
 
 
 class SampledFleet(Fleet):
-    """Sampled flights; those with the same sample times are looked up once for all of them."""
+    """A fleet of sampled flights; sample times that flights share are searched only once."""
 
     def __init__(self, trajectories: Sequence[SampledTrajectory]) -> None:
         self._flights = list(trajectories)
 
     @cached_property
-    def _bases(self) -> list[tuple[FloatArray, list[int]]]:
-        """Sample times, and which flights have them."""
+    def _flights_by_sample_times(self) -> list[tuple[FloatArray, list[int]]]:
+        """The distinct arrays of sample times, each with the indices of its flights."""
         by_bytes: dict[bytes, list[int]] = {}
         for i, flight in enumerate(self._flights):
             by_bytes.setdefault(flight.sample_times_s.tobytes(), []).append(i)
         return [(self._flights[of[0]].sample_times_s, of) for of in by_bytes.values()]
 
     @cached_property
-    def _table(self) -> tuple[FloatArray, IntArray | None]:
-        """Return the coefficients of every segment, a row each, grouped by aircraft.
+    def _coefficients_and_shifts(self) -> tuple[FloatArray, IntArray | None]:
+        """Return the coefficients of all segments, a row for each segment, grouped by aircraft.
 
         With it goes how much later those of each are than in order; None for nowhere. A table is
         there once: flights have theirs from there, and so has another fleet of some of them.
@@ -300,7 +300,7 @@ class SampledFleet(Fleet):
         table = places[0][0] if places and places[0] is not None else None
         if table is None or any(place is None or place[0] is not table for place in places):
             each = list({id(flight): flight for flight in self._flights}.values())
-            table, end = _side_by_side([flight.coefficients for flight in each]), 0
+            table, end = _stack_segment_rows([flight.coefficients for flight in each]), 0
             for flight in each:
                 start, end = end, end + len(flight.sample_times_s)
                 flight.coefficients = table[start:end, : len(flight.coefficients)].T
@@ -311,7 +311,7 @@ class SampledFleet(Fleet):
 
     @cached_property
     def _away_segments(self) -> BoolArray | None:
-        """In which segments, one after the other, an aircraft is away; None where none ever is."""
+        """Mask over all flights' segments, True in gaps with aircraft away; None without gaps."""
         gaps = [flight.away for flight in self._flights]
         if all(one is None for one in gaps):
             return None
@@ -341,7 +341,7 @@ class SampledFleet(Fleet):
             shape = (len(t), count)
             index, elapsed = np.empty(shape, dtype=np.intp), np.empty(shape)
             present = np.empty(shape, dtype=bool)
-            for base, columns in self._bases:
+            for base, columns in self._flights_by_sample_times:
                 segment, since, there = locate(base, t)
                 index[:, columns] = segment[:, np.newaxis] + self._find.first[columns]
                 elapsed[:, columns] = since[:, np.newaxis]
@@ -361,7 +361,7 @@ class SampledFleet(Fleet):
         return evaluate_in_blocks(self._state, aircraft, time_s)
 
     def _segments(self, index: IntArray, aircraft: IntArray) -> FloatArray:
-        table, later = self._table
+        table, later = self._coefficients_and_shifts
         index = index if later is None else index + later.take(aircraft)
         return np.ascontiguousarray(table.take(index, axis=0).T)
 
@@ -382,8 +382,8 @@ _NAMES = "lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad"
 _ROWS = dict(zip(_NAMES, (*POSITION_ROWS, *ATTITUDE_ROWS), strict=True))
 
 
-def _side_by_side(tables: Sequence[FloatArray]) -> FloatArray:
-    """Return coefficients (rows, n) of several flights as one table (segments, rows)."""
+def _stack_segment_rows(tables: Sequence[FloatArray]) -> FloatArray:
+    """Return flights' coefficients (rows, n) as one table, a row per segment, filled with zeros."""
     rows = max(map(len, tables), default=STRAIGHT_ROWS)
     result = np.zeros((sum(table.shape[1] for table in tables), rows))
     end = 0
@@ -396,7 +396,7 @@ def _side_by_side(tables: Sequence[FloatArray]) -> FloatArray:
 def _mean_speed_bound(
     time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
 ) -> FloatArray:
-    """Return what no mean speed between two samples exceeds, of one aircraft or of several."""
+    """Return an upper bound (m/s) on mean speeds between samples, for one or each aircraft."""
     if len(time_s) < 2:
         return np.zeros(lat_deg.shape[1:])
     fastest: list[FloatArray] = []
@@ -412,9 +412,9 @@ def _mean_speed_bound(
 
 
 def _is_velocity_of_path(measured: Vector, time_s: FloatArray, *place: FloatArray) -> bool:
-    """Return whether velocities are those of the path: median misfit in 5 m/s or 10 % of speed."""
+    """Return whether velocities fit the path: median misfit up to 5 m/s or 10 % of median speed."""
     misfit, speed = np.empty(len(time_s)), np.empty(len(time_s))
-    for part, inner, rows, offsets in blocks_of_path(time_s):
+    for part, inner, rows, offsets in overlapping_path_blocks(time_s):
         fitted, _ = fit_path(time_s[part], *(column[part] for column in place), offsets=offsets)
         off = sum((m[part] - f) ** 2 for m, f in zip(measured, fitted, strict=True))
         misfit[rows] = np.sqrt(off)[inner]

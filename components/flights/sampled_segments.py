@@ -53,7 +53,9 @@ _LIMITS = {
 
 
 def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, FloatArray]:
-    """Return the given columns as contiguous arrays of one length; what is read-only as it is."""
+    """Return the given columns as contiguous float arrays, without copying read-only ones;
+    ValueError for a bad shape, length, value or order of time.
+    """
     checked: dict[str, FloatArray] = {}
     for column, values in columns.items():
         if values is None:
@@ -87,7 +89,7 @@ def checked_samples(name: str, **columns: npt.ArrayLike | None) -> dict[str, Flo
 
 
 def all_within_limits(columns: Mapping[str, FloatArray]) -> bool:
-    """Return whether `checked_samples` refuses no value of any column."""
+    """Return whether all values of all columns are within the limits of `checked_samples`."""
     return all(bool((np.abs(array) <= _LIMITS[name][0]).all()) for name, array in columns.items())
 
 
@@ -97,7 +99,8 @@ def fit_segments(
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     velocity_enu_mps: Vector | None = None,
 ) -> FloatArray:
-    """Tabulate each segment's polynomials, (rows, n), or (rows, n, aircraft) at the same times.
+    """Return the polynomial coefficients of each segment, shape (rows, n), or (rows, n, aircraft)
+    for several aircraft with the same times.
 
     The last sample is a segment of its own; positions are latitude, longitude (deg), altitude (m).
     Without velocities all are straight, and there are `STRAIGHT_ROWS`, else `BENT_ROWS`.
@@ -114,7 +117,7 @@ def fit_segments(
     tangents = None
     if velocity_enu_mps is not None:
         tangents = _tangents(lat_deg, lon_deg, alt_m, velocity_enu_mps)
-    bent = None if tangents is None else _bent_segments(start, tangents, duration)
+    bent = None if tangents is None else _cubic_segment_mask(start, tangents, duration)
     for row, value in enumerate(start):
         table[_START + row] = value
         slope = np.diff(value, axis=0) / duration
@@ -141,7 +144,7 @@ def fit_segments(
 def _tangents(
     lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray, velocity_enu_mps: Vector
 ) -> tuple[FloatArray, ...]:
-    """Rates of change of the normal's components and of altitude, from the velocity."""
+    """Return the rates of the normal's components (1/s) and altitude (m/s) for velocities."""
     east, north, _ = local_axes(lat_deg, lon_deg)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
     v_east, v_north, v_up = velocity_enu_mps
@@ -151,10 +154,10 @@ def _tangents(
     return (*rates, v_up)
 
 
-def _bent_segments(
+def _cubic_segment_mask(
     start: tuple[FloatArray, ...], tangents: tuple[FloatArray, ...], duration: FloatArray
 ) -> npt.NDArray[np.bool_]:
-    """Return which segments' end velocities are plausible beside their mean velocity."""
+    """Return a mask over segments, True where both ends' velocities fit the mean between them."""
     misfit, change = np.zeros_like(duration), np.zeros_like(duration)
     for row, (value, tangent) in enumerate(zip(start, tangents, strict=True)):
         to_metres = 1.0 if row == 3 else SEMI_MAJOR_AXIS_M
@@ -168,7 +171,7 @@ def _bent_segments(
 def locate(
     sample_times: FloatArray, times: FloatArray
 ) -> tuple[npt.NDArray[np.intp], FloatArray, npt.NDArray[np.bool_]]:
-    """Return each time's segment, the time elapsed in it (s), and whether it is within the samples.
+    """Return each time's segment index, time (s) since that began, and a mask (True in samples).
 
     Times outside are moved to the nearest sample.
     """
@@ -182,7 +185,7 @@ def locate(
 def evaluate_segments(
     table: FloatArray, elapsed: FloatArray, present: npt.NDArray[np.bool_]
 ) -> TrajectoryState:
-    """Evaluate gathered segments, element by element."""
+    """Return states of segments, with coefficients column by column, each after its time (s)."""
 
     def at(part: int) -> FloatArray:
         slope = table[_SLOPE + part]

@@ -111,7 +111,8 @@ class ScriptedTrajectory:
         reference: tuple[float, float, float],
         **others: Any,
     ) -> ScriptedTrajectory:
-        """Start at an offset in a reference point's tangent frame, usually the ownship's start.
+        """Return a flight that starts at an east, north, up offset (m) from a reference point,
+        usually the ownship's start.
 
         The slant range at the start is exactly the offset's length; the altitude of a point with
         up 0 exceeds the reference's by 7.8 m at 10 km. `others` are as for `ScriptedTrajectory`.
@@ -126,7 +127,7 @@ class ScriptedTrajectory:
 
     @classmethod
     def of_segments(cls, *known: Any) -> Self:
-        """Return a flight whose segments are known already; see `_set_segments`."""
+        """Return a flight of ready segments, without checks; arguments as in `_set_segments`."""
         flight = cls.__new__(cls)
         flight._set_segments(*known)
         return flight
@@ -182,7 +183,7 @@ class ScriptedFleet(Growing, Fleet):
         kinds: IntArray,
         tables: dict[int, FloatArray],
     ) -> None:
-        """Store times (2, flights), numbers of legs, and each leg's start, pitch, roll and speed.
+        """Store the columns: times (2, flights), leg numbers, legs' starts, pitch, roll, speed.
 
         Fixed angles (3, flights) are NaN where the motion gives them; the table of each kind of
         legs holds those of that kind, in their order.
@@ -204,56 +205,56 @@ class ScriptedFleet(Growing, Fleet):
 
     @classmethod
     def of_columns(cls, *columns: Any) -> ScriptedFleet:
-        """Return flights whose columns are known already; see `_set_columns`."""
+        """Return a fleet of ready columns, without checks; arguments as in `_set_columns`."""
         fleet = cls.__new__(cls)
         fleet._set_columns(*columns)
         return fleet
 
     def with_flights(self, flights: ScriptedFleet) -> ScriptedFleet:
-        """Return a fleet with more flights at its end; neither is a subset."""
+        """Return these flights followed by more as a fleet; neither may be a subset of another."""
         sizes = {kind: table.values.shape[1] for kind, table in self._tables.items()}
         slot = flights._slot.copy()
         for kind in flights._tables:
             slot[flights._kind == kind] += sizes.get(kind, 0)
-        fleet = self.with_more(
+        fleet = self.with_appended(
             _slot=slot,
             _columns=flights._columns + len(self._names),
             **{name: getattr(flights, name) for name in _GROWING},
         )
-        fleet._forget()
+        fleet._clear_cached()
         fleet._find = self._find.with_paths(flights._find)
         fleet._some_fixed = self._some_fixed or flights._some_fixed
         fleet._tables = {**flights._tables, **self._tables}
         for kind in sizes.keys() & flights._tables.keys():
             more = flights._tables[kind].values
-            fleet._tables[kind] = self._tables[kind].with_more(more)
+            fleet._tables[kind] = self._tables[kind].with_appended(more)
         return fleet
 
-    def _forget(self) -> None:
-        """Forget what is worked out of all flights: they are others now."""
-        for name in ("_parts", "max_speeds_mps"):
+    def _clear_cached(self) -> None:
+        """Discard the cached properties, because the flights have changed."""
+        for name in ("_groups_and_others", "max_speeds_mps"):
             self.__dict__.pop(name, None)
 
-    def _table(self, kind: int, slot: IntArray) -> FloatArray:
-        """Return the table (rows, n) of legs of a kind."""
+    def _leg_tables(self, kind: int, slot: IntArray) -> FloatArray:
+        """Return the parameters (rows, n) of legs of one kind, by places in that kind's table."""
         return np.ascontiguousarray(self._tables[kind].values.T.take(slot, axis=0).T)
 
     def ramp_velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return velocities east and north (2, n), asked for as in `each`, where flights are on a
-        ramp, else NaN.
+        """Return the velocities (2, n) to the east and north (m/s) of the given flights, each at
+        its own time; NaN where a flight is on no ramp.
         """
         leg, elapsed = self._legs_at(self._columns[aircraft], time_s)
         velocity = np.full((2, len(leg)), np.nan)
         on = np.flatnonzero(self._kind[leg] == _RAMP)
         if len(on):
-            table = self._table(_RAMP, self._slot[leg[on]])
+            table = self._leg_tables(_RAMP, self._slot[leg[on]])
             velocity[:, on] = ramp_velocity(table, elapsed[on])
         return velocity
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
         """Return the fleet of some flights, without preparing them anew."""
         fleet = copy(self)
-        fleet._forget()
+        fleet._clear_cached()
         fleet._columns = self._columns[columns]
         return fleet
 
@@ -286,9 +287,9 @@ class ScriptedFleet(Growing, Fleet):
         return self._between_s[:, self._columns].T
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
-        """Return every aircraft's state at some times."""
+        """Return the states of all flights at the given times, shape (times, flights)."""
         times = check_times(time_s)
-        groups, others = self._parts
+        groups, others = self._groups_and_others
         parts = [(group.columns, group.at(times)) for group in groups]
         if len(others):
             shape = len(times), len(others)
@@ -304,11 +305,11 @@ class ScriptedFleet(Growing, Fleet):
         return state
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of chosen aircraft (n,), each at its own time (n,) in s."""
+        """Return the states (n,) of the given flights, each at its own time (s)."""
         return evaluate_in_blocks(self._state, self._columns[aircraft], time_s)
 
     def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
-        """Return the leg that each of all flights is on at a time, and since when, s."""
+        """Return the index of each flight's leg at its time, and the time (s) since it began."""
         start_s, until_s = self._between_s[0].take(aircraft), self._until_s.take(aircraft)
         elapsed = np.where(time_s > start_s, time_s, start_s)
         elapsed = np.where(elapsed < until_s, elapsed, until_s) - start_s
@@ -322,12 +323,12 @@ class ScriptedFleet(Growing, Fleet):
         in_use = np.flatnonzero(np.bincount(kinds)).tolist()
         if len(in_use) == 1:
             kind = in_use[0]
-            lat, lon, alt, yaw = _BY_KIND[kind](self._table(kind, slot), elapsed)
+            lat, lon, alt, yaw = _BY_KIND[kind](self._leg_tables(kind, slot), elapsed)
         else:
             lat, lon, alt, yaw = moved = tuple(np.empty(len(leg)) for _ in range(4))
             for kind in in_use:
                 chosen = np.flatnonzero(kinds == kind)
-                values = _BY_KIND[kind](self._table(kind, slot[chosen]), elapsed[chosen])
+                values = _BY_KIND[kind](self._leg_tables(kind, slot[chosen]), elapsed[chosen])
                 for out, value in zip(moved, values, strict=True):
                     out[chosen] = value
         pitch, roll = self._legs[1].take(leg), self._legs[2].take(leg)
@@ -339,7 +340,7 @@ class ScriptedFleet(Growing, Fleet):
         return TrajectoryState(lat, lon, alt, yaw, pitch, roll, present)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return single aircraft's speeds over ground (n,), each at a time (n,) of its own."""
+        """Return the ground speeds (m/s) of the given flights, each at its own time."""
         leg, _ = self._legs_at(self._columns[aircraft], time_s)
         level = self._legs[3][leg] * np.cos(self._legs[1][leg])
         level = np.where(self._kind[leg] == _HOLD, 0.0, level)
@@ -353,8 +354,8 @@ class ScriptedFleet(Growing, Fleet):
         return self._fixed_rad[:, self._columns[aircraft]]
 
     @cached_property
-    def _parts(self) -> tuple[list[FormulaGroup], IntArray]:
-        """Flights of one leg each, straight or held, by formula; and the indices of the others."""
+    def _groups_and_others(self) -> tuple[list[FormulaGroup], IntArray]:
+        """Flights of a single straight or hold leg by formula, and the others' indices."""
         flights = self._columns
         leg = self._find.first[flights]
         kinds = np.where(self._counts[flights] == 1, self._kind[leg], -1)
@@ -370,7 +371,7 @@ class ScriptedFleet(Growing, Fleet):
                 FormulaGroup(
                     _BY_KIND[kind],
                     members,
-                    self._table(kind, self._slot[legs])[:, np.newaxis],
+                    self._leg_tables(kind, self._slot[legs])[:, np.newaxis],
                     (self._between_s[0][of], self._between_s[1][of], self._until_s[of]),
                     np.where(np.isnan(fixed), derived, fixed),
                     ~np.isnan(fixed[0]),

@@ -12,7 +12,7 @@ import numpy as np
 
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M, Segment
-from components.flights.legs import Straight, Turn, fly_each
+from components.flights.legs import Straight, Turn, segments_of_each
 from components.flights.point_mass import eased_turn_rates
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedTrajectory
 from components.geometry import (
@@ -40,20 +40,20 @@ Pieces = tuple[tuple[float, float, float], ...]
 
 
 def times_around_s(time_s: FloatArray) -> FloatArray:
-    """Return before, at and after each of some times (n,), (n, 3); no flight is known before 0."""
+    """Return three times (n, 3) for each (n,): shortly before, at and after it, none before 0."""
     ends = [np.maximum(time_s - _BASE_S, np.minimum(time_s, 0.0)), time_s, time_s + _BASE_S]
     return np.stack(ends, axis=-1)
 
 
 class Turning(NamedTuple):
-    """How an aircraft turns as a manoeuvre begins: track, rate, and what it turned in a second."""
+    """How an aircraft turns when a manoeuvre begins: track, turn rate, and turn in a second."""
 
     track_rad: float
     rate_rad_s: float
     turned_rad: float
 
     def eased_pieces(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
-        """Return the rates of an eased turn to a manoeuvre's track, the short way round."""
+        """Return the pieces of an eased turn to the manoeuvre's heading, the shorter way round."""
         left_rad = math.remainder(manoeuvre.heading_rad - self.track_rad, 2.0 * math.pi)
         rates = eased_turn_rates(
             left_rad,
@@ -67,8 +67,8 @@ class Turning(NamedTuple):
 
 
 class SteeringPlan(NamedTuple):
-    """What is still to be flown of turns (deg/s), climbs and ground speeds (m/s), side by side;
-    afterwards straight on, at the climb and the speed that remain.
+    """What is still to be flown, in parallel: pieces of turns (deg/s), of climbs and of ground
+    speeds (m/s); after them straight flight at the remaining climb and speed.
     """
 
     turns: Pieces
@@ -86,17 +86,17 @@ class SteeringPlan(NamedTuple):
         )
 
     def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
-        """Return the plan changed by a manoeuvre, from an altitude; its other parts stay."""
+        """Return the plan changed by a manoeuvre at an altitude; what it does not command stays."""
         plan = self
-        speed_now_mps = _mean(self.speeds, 0.0, self.speed_mps)
+        speed_now_mps = _mean_rate(self.speeds, 0.0, self.speed_mps)
         if manoeuvre.eases_rad > 0.0:
             plan = plan._replace(turns=turning.eased_pieces(manoeuvre, speed_now_mps))
         elif manoeuvre.turn_rad != 0.0:
-            plan = plan._replace(turns=_turn(manoeuvre, speed_now_mps))
+            plan = plan._replace(turns=_turn_pieces(manoeuvre, speed_now_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
-            climb_mps = _mean(self.climbs, 0.0, self.climb_mps)
+            climb_mps = _mean_rate(self.climbs, 0.0, self.climb_mps)
             plan = plan._replace(
-                climbs=_ramp(
+                climbs=_speed_change_pieces(
                     climb_mps, manoeuvre.vertical_speed_mps, manoeuvre.vertical_acceleration_mps2
                 ),
                 climb_mps=climb_mps + manoeuvre.vertical_speed_mps,
@@ -108,10 +108,10 @@ class SteeringPlan(NamedTuple):
                 climbs=((rise_s, rate_mps, 0.0),) if rise_s > 0.0 else (), climb_mps=0.0
             )
         if manoeuvre.speed_mps != 0.0:
-            speed_mps = _mean(self.speeds, 0.0, self.speed_mps)
+            speed_mps = _mean_rate(self.speeds, 0.0, self.speed_mps)
             change = max(manoeuvre.speed_mps, -speed_mps)
             plan = plan._replace(
-                speeds=_ramp(speed_mps, change, manoeuvre.acceleration_mps2),
+                speeds=_speed_change_pieces(speed_mps, change, manoeuvre.acceleration_mps2),
                 speed_mps=speed_mps + change,
             )
         return plan
@@ -123,8 +123,8 @@ class SteeringPlan(NamedTuple):
         while plan.turns or plan.climbs or plan.speeds:
             parts = plan.turns, plan.climbs, plan.speeds
             lasts_s = min(part[0][0] for part in parts if part)
-            climb_mps = _mean(plan.climbs, lasts_s, plan.climb_mps)
-            speed_mps = max(_mean(plan.speeds, lasts_s, plan.speed_mps), 0.0)
+            climb_mps = _mean_rate(plan.climbs, lasts_s, plan.climb_mps)
+            speed_mps = max(_mean_rate(plan.speeds, lasts_s, plan.speed_mps), 0.0)
             rate_deg_s = plan.turns[0][1] if plan.turns else 0.0
             legs.append(_leg(lasts_s, speed_mps, climb_mps, rate_deg_s))
             plan = plan.remaining_after(lasts_s)
@@ -134,7 +134,7 @@ class SteeringPlan(NamedTuple):
 def _leg(
     lasts_s: float | None, speed_mps: float, climb_mps: float, rate_deg_s: float = 0.0
 ) -> Straight | Turn:
-    """Return a leg; what a plan holds is sound and not checked again."""
+    """Return a leg without validating it, as the values of a plan are valid already."""
     flown: dict[str, Any] = {
         "duration_s": lasts_s, "speed_mps": speed_mps, "climb_mps": climb_mps,
     }  # fmt: skip
@@ -143,8 +143,8 @@ def _leg(
     return Straight.model_construct(**flown)
 
 
-def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
-    """Return a turn at a ground speed: the pieces in which it rolls in, and its steady rest."""
+def _turn_pieces(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
+    """Return the pieces of a turn at a ground speed: while the bank grows, then one steady."""
     rate_rad_s = manoeuvre.rate_rad_s
     if manoeuvre.bank_rad:
         slowest_mps = max(speed_mps, _SLOWEST_BANKED_MPS)
@@ -164,7 +164,8 @@ def _turn(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
 def _roll_in_pieces(
     angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float
 ) -> Pieces:
-    """Return how a turn begins whose bank grows at a steady rate, at mean rates in deg/s.
+    """Return the first pieces of a turn, in which the bank grows at a steady rate, each at its mean
+    turn rate (deg/s).
 
     With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
     -g / (v p) ln cos(p t). The first piece is longer where the turn would hardly show in it.
@@ -205,8 +206,8 @@ def _remaining_pieces(pieces: Pieces, elapsed_s: float) -> Pieces:
     return ()
 
 
-def _mean(pieces: Pieces, first_s: float, without: float) -> float:
-    """Return the mean rate over the first seconds of the first piece, or what is flown without."""
+def _mean_rate(pieces: Pieces, first_s: float, without: float) -> float:
+    """Return the mean rate over the first piece's ``first_s``, or ``without`` if there is none."""
     if not pieces:
         return without
     lasts_s, mean, change = pieces[0]
@@ -214,7 +215,7 @@ def _mean(pieces: Pieces, first_s: float, without: float) -> float:
 
 
 class SteeredPart(ScriptedTrajectory):
-    """What is flown after a manoeuvre, with the plan that it follows."""
+    """The flight after a manoeuvre, with the plan that it follows."""
 
     plan: SteeringPlan
 
@@ -226,13 +227,13 @@ def steered_parts(
     manoeuvres: Sequence[Manoeuvre],
     before: Sequence[SteeredPart | None],
 ) -> list[SteeredPart]:
-    """Return the parts of aircraft's flights from a manoeuvre on.
+    """Return for each aircraft the part of its flight that begins with its manoeuvre.
 
     `around` says where each would be without it, (n, 3), at `times_around_s`. Parts of an
     earlier manoeuvre, `before`, that are not commanded anew go on.
     """
     starts: list[_Start] = []
-    ways = chords(around, time_s) if any(one is None for one in before) else []
+    ways = displacements_around(around, time_s) if any(one is None for one in before) else []
     rows = zip(time_s.tolist(), manoeuvres, before, strict=True)
     for row, (at_s, manoeuvre, earlier) in enumerate(rows):
         low, here, high = around.alt_m[row].tolist()
@@ -256,7 +257,7 @@ def steered_parts(
                 _turned_angle_deg(earlier.plan.turns, elapsed_s)
                 - _turned_angle_deg(earlier.plan.turns, elapsed_s - 1.0)
             )
-            rate_rad_s = math.radians(_mean(plan.turns, 0.0, 0.0))
+            rate_rad_s = math.radians(_mean_rate(plan.turns, 0.0, 0.0))
         turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
         starts.append(_Start(name, position, heading_deg, at_s, plan))
@@ -268,8 +269,8 @@ def steered_parts(
     return flown
 
 
-def chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
-    """Return the way from before to after each time, north and east, m, and how long it takes, s.
+def displacements_around(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
+    """Return displacements from shortly before to after each time: north, east (m) and time (s).
 
     Its ends are seen from its middle, so that the track is the one there.
     """
@@ -281,7 +282,7 @@ def chords(around: TrajectoryState, time_s: FloatArray) -> list[list[float]]:
 
 
 def _turned_angle_deg(turns: Pieces, elapsed_s: float) -> float:
-    """Return how far has been turned after some time, deg."""
+    """Return the angle (deg, to the right) that the turns have covered after some time."""
     turned_deg, left_s = 0.0, elapsed_s
     for lasts_s, rate_deg_s, _ in turns:
         if left_s <= 0.0:
@@ -292,14 +293,14 @@ def _turned_angle_deg(turns: Pieces, elapsed_s: float) -> float:
 
 
 def _remaining_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
-    """Return the climb that is left of a flight's own: a turn or a climb ends it."""
+    """Return the climb rate (m/s) a manoeuvre keeps: 0 if a turn or altitude change ends it."""
     turns = manoeuvre.turn_rad != 0.0 or manoeuvre.eases_rad > 0.0
     ends = turns or manoeuvre.climb_m != 0.0
     return 0.0 if ends and manoeuvre.vertical_speed_mps == 0.0 else climb_mps
 
 
 class _Start(NamedTuple):
-    """Where what is flown by a plan begins."""
+    """The name, position, heading and time from which a plan is flown."""
 
     name: str
     position: tuple[float, float, float]
@@ -315,7 +316,7 @@ _FEW = 2
 
 
 def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
-    """Return what is flown from some places on, each as its script would be by itself."""
+    """Return the parts flown by several plans from their starts, as if flown one by one."""
     legs = [start.plan.legs() for start in starts]
     if len(starts) > _FEW:
         headings = np.array([heading_from_deg(start.heading_deg) for start in starts])
@@ -325,7 +326,7 @@ def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
         if known.all() and np.abs(alt_m).max() <= MOST_ALT_M and min(speeds) >= 0.0:
             with suppress(ValueError):
                 here = lat_deg, wrap_longitude_deg(lon_deg), alt_m
-                segments = fly_each(here, headings, legs)
+                segments = segments_of_each(here, headings, legs)
                 return [_part(*both) for both in zip(starts, segments, strict=True)]
     return [  # each by itself, which of a few takes less time, and says what is wrong
         _part(start, ScriptedTrajectory(
@@ -345,8 +346,8 @@ def _part(start: _Start, segments: list[Segment]) -> SteeredPart:
     return part
 
 
-def _ramp(from_mps: float, change_mps: float, acceleration_mps2: float) -> Pieces:
-    """Return a steady change of speed in equal steps, each at its mean."""
+def _speed_change_pieces(from_mps: float, change_mps: float, acceleration_mps2: float) -> Pieces:
+    """Return a steady change of speed as pieces of equal length, each at its mean speed."""
     time_s = abs(change_mps) / acceleration_mps2
     count = max(math.ceil(time_s / _SPEED_STEP_S), 1)
     lasts_s = max(time_s / count, 1e-9)

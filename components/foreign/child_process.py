@@ -25,7 +25,7 @@ for folder in sys.argv[2:]:
 
 
 class ChildProcess:
-    """A program in a group of processes of its own, with what ends it when we are gone.
+    """A program in a process group of its own, which is ended also when this process dies.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def describe_exit(code: int) -> str:
 
 
 def _end(process: Any, guard: Any, removes: Path | None) -> None:
-    """Kill the program's whole group, reap what we started, and remove what is left."""
+    """Kill the program's process group, await its end, close its pipes, remove a given folder."""
     if os.name == "posix":
         with suppress(OSError):
             os.killpg(process.pid, signal.SIGKILL)

@@ -65,14 +65,14 @@ class HorizontalCas(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        self._advisory = self._ask_network(alerts)
+        self._advisory = self._advisory_index(alerts)
         rate = math.radians(RATES_DEG_S[self._advisory])
         if rate == 0.0:
             return None
         turn = Manoeuvre(turn_rad=rate * self.p.step_s, rate_rad_s=abs(rate))
         return Manoeuvres.of([int(wake.ticks[0])], [turn])
 
-    def _ask_network(self, alerts: AlertLevels) -> int:
+    def _advisory_index(self, alerts: AlertLevels) -> int:
         there = alerts.relative
         own_east, own_north = (float(alerts.own_motion[n][0]) for n in ("east_mps", "north_mps"))
         course = math.atan2(own_east, own_north)
@@ -102,7 +102,7 @@ class HorizontalCas(Component):
 
 
 def time_to_co_altitude(up_m: float, climb_mps: float, height_m: float) -> float:
-    """Return after how long a relative height is within some; infinite if it never is."""
+    """Return the time (s) to a relative height within ``height_m``: 0 if now, infinite if never."""
     outside_m = abs(up_m) - height_m
     if outside_m <= 0.0:
         return 0.0
@@ -111,7 +111,7 @@ def time_to_co_altitude(up_m: float, climb_mps: float, height_m: float) -> float
 
 
 def read_networks(folder: Path) -> dict[tuple[int, int], Network]:
-    """Return the network of each advisory before and each time, which must all be there."""
+    """Return networks by (previous advisory, s to co-altitude); ValueError if one is missing."""
     found: dict[tuple[int, int], Path] = {}
     for path in sorted(folder.glob("*.nnet")):
         if name := _NAME.search(path.name):

@@ -16,7 +16,7 @@ from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
-from components.messages.detections import describe_rangeless
+from components.messages.detections import names_of_rangeless_sensors
 from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
@@ -83,7 +83,7 @@ class MavlinkParameters(ClockedParameters):
 
 @dataclass(eq=False)
 class AutopilotStates(Message):
-    """What an autopilot says of itself, as it was known at each instant; NaN before it did.
+    """What an autopilot reports of its flight, as known at each instant; NaN before the first.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ class AutopilotStates(Message):
 
 
 class UdpLink:
-    """A socket that talks to one address; datagrams from others are thrown away."""
+    """A UDP socket that exchanges datagrams with one address and ignores those from others."""
 
     def __init__(self, address: str, local_port: int) -> None:
         host, _, port = address.rpartition(":")
@@ -123,7 +123,7 @@ class UdpLink:
             raise ValueError(f"address {address}, local_port {local_port}: {error}") from None
 
     def send(self, datagrams: list[bytes]) -> None:
-        """Send datagrams; a peer that does not listen is noticed by its missing answers."""
+        """Send datagrams; nothing is raised if nobody listens."""
         for datagram in datagrams:
             try:
                 self._socket.sendto(datagram, self._peer)
@@ -131,7 +131,7 @@ class UdpLink:
                 continue
 
     def receive(self, wait_s: float) -> bytes | None:
-        """Return a datagram of the peer, None if none has come within a time."""
+        """Return the next datagram from the peer, or None if none arrives within ``wait_s``."""
         until = time.monotonic() + wait_s
         while True:
             self._socket.settimeout(max(0.0, until - time.monotonic()))
@@ -178,12 +178,14 @@ class Mavlink(Component):
         self._rangeless = self._heard = 0
 
     def warnings(self) -> list[str]:
-        """Warn that no sensor measures range: tracks without one are not sent."""
-        blind = describe_rangeless(one for one in self.context.producers if one.port == "estimates")
+        """Return a warning if a producer measures no range, as only tracks with one are sent."""
+        blind = names_of_rangeless_sensors(
+            one for one in self.context.producers if one.port == "estimates"
+        )
         return [f"{blind} measures no range: no track is sent"] if blind else []
 
     def failure_counts(self) -> dict[str, tuple[int, int]]:
-        """Return how many tracks had no range and were not sent."""
+        """Return how many tracks were not sent because they had no range, of how many received."""
         if not self._heard:
             return {}
         return {"a track has no range and is not sent": (self._rangeless, self._heard)}
@@ -203,7 +205,7 @@ class Mavlink(Component):
         before, self._before = self._before, (time_s, states)
         if before is None:  # a velocity needs two positions
             return None
-        own, others = _flying(states, before[1], time_s - before[0])
+        own, others = _ownship_and_targets(states, before[1], time_s - before[0])
         held = wake.held("estimates")
         if "estimates" in {producer.port for producer in self.context.producers}:
             others = []
@@ -219,14 +221,16 @@ class Mavlink(Component):
             datagrams.insert(0, self._link.heartbeat())
         self._udp.send(datagrams)
         self._read_messages(time_s)
-        told = self._follow(int(wake.ticks[0]), own)
+        told = self._manoeuvre_to_follow(int(wake.ticks[0]), own)
         found: dict[str, Message] = {"autopilot": _row(wake, self._says)}
         if told is not None:
             found["manoeuvres"] = Manoeuvres.of([int(wake.ticks[0])], [told])
         return found
 
     def _read_messages(self, time_s: float) -> None:
-        """Read all messages that have come; wait for this instant's reply if one is required."""
+        """Read all datagrams that have arrived, waiting up to ``answer_s`` for the reply to this
+        time; TimeoutError after a long silence.
+        """
         # Its own times are whole milliseconds.
         wanted_s = math.floor(1e3 * time_s) / 1e3
         until = time.monotonic() + self.p.answer_s
@@ -247,8 +251,10 @@ class Mavlink(Component):
                 "running, and does it send to the port from which it hears us?"
             )
 
-    def _follow(self, tick: int, own: Flying) -> Manoeuvre | None:
-        """Return what turns the ownship to where the autopilot flies, or climbs as it does."""
+    def _manoeuvre_to_follow(self, tick: int, own: Flying) -> Manoeuvre | None:
+        """Return the manoeuvre that turns or climbs the ownship as the autopilot flies, or None if
+        none is needed or one is under way.
+        """
         flown = self._says.flying
         if tick < self._free_from or not math.isfinite(self._says.position_s):
             return None
@@ -279,10 +285,10 @@ def _row(wake: Wake, says: AutopilotSays) -> AutopilotStates:
     return AutopilotStates(wake.ticks, *(np.array([v]) for v in (*times, *flying[2:11])))
 
 
-def _flying(
+def _ownship_and_targets(
     now: TrafficStates, before: TrafficStates, elapsed_s: float
 ) -> tuple[Flying, list[Flying]]:
-    """Return the ownship and the targets that are there, with velocities since the time before."""
+    """Return the ownship and targets present, with velocities by displacement since last time."""
 
     def moved(prefix: str, k: Any) -> FloatArray:
         places = [
@@ -308,7 +314,7 @@ def _flying(
 
 
 def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
-    """Return confirmed and coasted tracks with a range, carried on straight to an instant.
+    """Return confirmed and coasted tracks with a range, moved at constant velocity to a time.
 
     One without a detection for `STALE_S` is none.
     """

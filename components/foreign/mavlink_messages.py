@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from components.formats.asterix_records import callsign
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 _E7, _MILLI, _CENTI = 1e7, 1e3, 1e2
 _DIALECT = "pymavlink.dialects.v20.common"
@@ -17,7 +17,7 @@ _MOST_AGE_S = 255
 
 
 class Flying(NamedTuple):
-    """Where an aircraft is and how it moves.
+    """The position, velocity and attitude of an aircraft.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ class Flying(NamedTuple):
 
 
 class AutopilotSays(NamedTuple):
-    """The last of each of an autopilot's messages; times are its own, s."""
+    """The flight that an autopilot has last reported; times (s) are by its own clock."""
 
     attitude_s: float = -math.inf
     position_s: float = -math.inf
@@ -60,7 +60,7 @@ class AutopilotSays(NamedTuple):
 
 
 class Link:
-    """Makes and takes apart the datagrams of one connection."""
+    """Encodes and decodes the MAVLink datagrams of one connection."""
 
     def __init__(self) -> None:
         self._dialect = import_extra(_DIALECT, "mavlink", "foreign.mavlink")
@@ -75,7 +75,7 @@ class Link:
         return bytes(made.pack(self._ours))
 
     def vehicles(self, others: Iterable[Flying]) -> list[bytes]:
-        """Return an ADSB_VEHICLE of each: heights geometric, courses for headings."""
+        """Return each aircraft's ADSB_VEHICLE message: geometric heights, courses as headings."""
         found = []
         for one in others:
             name = (callsign(one.name) or "").encode()
@@ -105,7 +105,7 @@ class Link:
         return bytes(made.pack(self._ours))
 
     def update(self, datagram: bytes, before: AutopilotSays) -> AutopilotSays:
-        """Return the state after a datagram; garbage and other messages change nothing."""
+        """Return the report updated by a datagram; unreadable or other messages change nothing."""
         says = before
         # A datagram is whole: what a broken one leaves over must not swallow the next.
         theirs = self._dialect.MAVLink(None)

@@ -25,7 +25,7 @@ _PLANE = ("name", "aircraft", "rcs_dbsm", "swerling", "eo", "ir", "contrast", "c
 
 
 class ChainOfMosaik(MosaikApi):
-    """Sensors and fusion of a scene, stepped by mosaik at their own scans.
+    """A scene's sensors and fusion as a simulator for mosaik, stepped at the scene's own scans.
 
     ``world.start("dsa_des", time_resolution=..., scene=..., seed=...)`` takes what `Simulator`
     does. One ``Ownship`` and any number of ``Plane`` (parameters of `Simulator.add_plane`) take
@@ -45,7 +45,7 @@ class ChainOfMosaik(MosaikApi):
         self._ownship: str | None = None
 
     def init(self, sid: str, time_resolution: float = 1.0, **sim_params: Any) -> Any:
-        """Read the scene, and see that mosaik's steps and its scans meet.
+        """Read the scene and check that its scans fall on mosaik's steps.
 
         Raises
         ------
@@ -83,7 +83,7 @@ class ChainOfMosaik(MosaikApi):
         return self.meta
 
     def create(self, num: int, model: str, **model_params: Any) -> Any:
-        """Make the ownship, or planes."""
+        """Create the ownship or planes, and return their entity ids and types."""
         if model == "Ownship":
             if num != 1 or self._ownship is not None:
                 raise ValueError("there is one Ownship")
@@ -99,9 +99,9 @@ class ChainOfMosaik(MosaikApi):
         self._chain.start()
 
     def step(self, time: int, inputs: Mapping[str, Any], max_advance: int) -> int:
-        """Make the scans of this instant; return the step of the next."""
-        own = _place(self._ownship or "Ownship", inputs)
-        planes = [_place(name, inputs) for name in self._chain.planes]
+        """Run this step's scans with the given poses; return the next scan's step number."""
+        own = _pose_from_inputs(self._ownship or "Ownship", inputs)
+        planes = [_pose_from_inputs(name, inputs) for name in self._chain.planes]
         rows = np.array(planes, dtype=np.float64).reshape(-1, 6)
         self._seen: EncounterResult = self._chain.simulate(
             own[:3], own[3:], rows[:, :3], rows[:, 3:], Fraction(time) * self._step_s
@@ -134,8 +134,10 @@ class ChainOfMosaik(MosaikApi):
         return rows
 
 
-def _place(entity: str, inputs: Mapping[str, Any]) -> list[float]:
-    """Return latitude and longitude (rad), altitude, yaw, pitch and roll of an aircraft."""
+def _pose_from_inputs(entity: str, inputs: Mapping[str, Any]) -> list[float]:
+    """Return an aircraft's latitude, longitude (rad), altitude (m), yaw, pitch and roll (rad) from
+    mosaik's inputs; NaN for a position not given.
+    """
     given = inputs.get(entity, {})
     values = {}
     for name, by_source in given.items():
@@ -144,11 +146,11 @@ def _place(entity: str, inputs: Mapping[str, Any]) -> list[float]:
         values[name] = float(next(iter(by_source.values())))
     there = [values.get(name, math.nan) for name in POSE_FIELDS[:3]]
     turned = [values.get(name, 0.0) for name in POSE_FIELDS[3:]]
-    return [*(_angle_of(value) for value in there[:2]), there[2], *turned]
+    return [*(_round_trip_radians(value) for value in there[:2]), there[2], *turned]
 
 
-def _angle_of(value_deg: float) -> float:
-    """Return the angle that turns back into these very degrees, where there is one."""
+def _round_trip_radians(value_deg: float) -> float:
+    """Return an angle (rad) that converts back to exactly the degrees given, else the nearest."""
     near = math.radians(value_deg)
     for angle in (near, math.nextafter(near, math.inf), math.nextafter(near, -math.inf)):
         if float(np.degrees(angle)) == value_deg:

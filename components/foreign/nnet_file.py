@@ -49,7 +49,7 @@ class Network:
 
 
 def read_nnet(path: Path, inputs: int, outputs: int) -> Network:
-    """Read a network that must have so many inputs and outputs.
+    """Read a neural network from a .nnet file and check its numbers of inputs and outputs.
 
     Raises
     ------

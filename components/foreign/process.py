@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, model_validator
 
 from components.aircraft.aircraft import Roster
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.foreign.process_answers import message_of_table
 from components.foreign.process_link import VERSION, ProcessError, ProcessLink, frame
 from components.messages.detections import Detections, SensorOffer
@@ -37,7 +37,7 @@ from dsa_des.time.clock import ClockSpec
 _HELLO, _CALL, _STATE = "hello", "call", "state"
 
 
-def _is_list(value: Any) -> Any:
+def _refuse_single_text(value: Any) -> Any:
     if isinstance(value, str):
         raise ValueError(
             'must be a list of words, as ["python3", "tracker.py"]: no shell takes a line apart'
@@ -48,9 +48,11 @@ def _is_list(value: Any) -> Any:
 class ProcessParameters(Parameters):
     """Parameters of a program that runs as a block."""
 
-    command: Annotated[list[str], BeforeValidator(_is_list), Field(min_length=1)] = Field(
-        description="The program and its arguments, word by word; no shell looks at them. `python` "
-        "is the one that runs this."
+    command: Annotated[list[str], BeforeValidator(_refuse_single_text), Field(min_length=1)] = (
+        Field(
+            description="The program and its arguments, word by word; no shell looks at them. "
+            "`python` is the one that runs this."
+        )
     )
     folder: ScenePath | None = Field(
         None, description="Where the program runs; by default the folder of the scene's file."
@@ -87,15 +89,15 @@ class ProcessParameters(Parameters):
 
     @model_validator(mode="after")
     def _check_program(self) -> "ProcessParameters":
-        program = self.program()
+        program = self.program_path()
         if program is None:
             raise ValueError(f"command: there is no program {self.command[0]!r}")
         if self.folder is not None and not self.folder.is_dir():
             raise ValueError(f"folder: {self.folder} is no folder")
         return self
 
-    def program(self) -> str | None:
-        """Return the path of the program, or None where there is none."""
+    def program_path(self) -> str | None:
+        """Return the path of the command's program, or None if it is not found."""
         name = self.command[0]
         if name == "python":
             return sys.executable
@@ -115,7 +117,7 @@ class ProcessParameters(Parameters):
 
 
 class Process(Component):
-    """Runs a program and asks it, over pipes, at every instant at which something comes.
+    """Runs one's own program as a block, exchanging tables over pipes when messages arrive.
 
     What arrives is sent as the tables that a run records of it, and answers are tables of
     ``manoeuvres``, ``detections``, ``tracks`` or ``state_tracks`` with the columns of these
@@ -138,7 +140,7 @@ class Process(Component):
 
     @classmethod
     def class_for(cls, parameters: Any) -> type[Component]:
-        """Return the class whose state can be taken back, where the program's can."""
+        """Return the class for the parameters: rewindable if the program has ``snapshots``."""
         return RewindableProcess if parameters.snapshots else cls
 
     @classmethod
@@ -148,7 +150,9 @@ class Process(Component):
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
     def offer(self, port: str) -> Any:
-        """Return that detections may have a range, and nothing about their accuracy."""
+        """Return for detections that they may have a range and state no accuracy; None for other
+        ports.
+        """
         return (
             SensorOffer(measures_range=True, resolution_rad=0.0) if port == "detections" else None
         )
@@ -156,7 +160,7 @@ class Process(Component):
     def setup(self) -> None:
         """Prepare the program; it starts when it is asked first."""
         self._link = ProcessLink(
-            [str(self.p.program()), *self.p.command[1:]], Path(self.p.folder or ".")
+            [str(self.p.program_path()), *self.p.command[1:]], Path(self.p.folder or ".")
         )
         #: Its state before the next call, and the state in which it is: one by value, one by run.
         self._state: bytes | None = None
@@ -164,11 +168,11 @@ class Process(Component):
         self._is_in = _Current()
         #: How often it was asked, and how often it had something to say.
         self._calls = self._answers = 0
-        rosters = known_targets(self.context)
+        rosters = offered_rosters(self.context)
         self._roster = rosters[0] if rosters else None
 
     def start(self) -> None:
-        """Start the program ahead of the first call."""
+        """Start the program, if it does not run yet, before its first call."""
         if not self._link.runs:
             self._start_program()
 
@@ -184,17 +188,17 @@ class Process(Component):
                 first, last = np.searchsorted(new.tick, [tick, tick + 1])
                 if last > first:
                     sent.append((new.source, new.message.take(slice(int(first), int(last)))))
-            answer = self._call(tick, int(wake.scans[row]), sent)
+            answer = self._call_program(tick, int(wake.scans[row]), sent)
             said = list(self._messages(answer, wake.ticks[row : row + 1], sent))
             self._calls, self._answers = self._calls + 1, self._answers + bool(said)
             for name, message in said:
                 parts.setdefault(name, []).append(message)
         return {n: type(found[0]).concatenate(found) for n, found in parts.items()} or None
 
-    def _call(self, tick: int, scan: int, sent: Any) -> Any:
+    def _call_program(self, tick: int, scan: int, sent: Any) -> Any:
         frames = self._call_frames(tick, scan)
         for source, message in sent:
-            for table, batch in _batches(message):
+            for table, batch in _recorded_batches(message):
                 frames += frame(table, batch, {"block": source})
         while True:
             try:
@@ -210,7 +214,7 @@ class Process(Component):
         before = self._first_state if self._state is None else self._state
         wanted = []
         if before is not None and before is not self._is_in.state:
-            wanted = frame(_STATE, _message_fields(state=before), {})
+            wanted = frame(_STATE, _single_row_batch(state=before), {})
         answer = self._link.ask([*wanted, *frames], self.p.deadline_s)
         after = [table for about, table in answer if about.get("table") == _STATE]
         if type(self).rewindable:
@@ -227,7 +231,7 @@ class Process(Component):
             "arguments": json.dumps(self.p.arguments), "seed": str(self.context.streams.seed),
             "snapshots": str(type(self).rewindable).lower(),
         }  # fmt: skip
-        answer = self._link.ask(frame(_HELLO, _message_fields(), about), self.p.deadline_s)
+        answer = self._link.ask(frame(_HELLO, _single_row_batch(), about), self.p.deadline_s)
         said = answer[0][0] if answer else {}
         wrong = ""
         if said.get("table") != _HELLO:
@@ -251,7 +255,7 @@ class Process(Component):
 
     def _call_frames(self, tick: int, scan: int) -> list[Any]:
         time_s = tick / self.context.ticks_per_s
-        return frame(_CALL, _message_fields(tick=tick, time_s=time_s, scan=scan), {})
+        return frame(_CALL, _single_row_batch(tick=tick, time_s=time_s, scan=scan), {})
 
     # -- answers -------------------------------------------------------------------------------
 
@@ -275,7 +279,7 @@ class Process(Component):
         return self._roster or Roster.from_pairs([])
 
     def failure_counts(self) -> dict[str, tuple[int, int]]:
-        """Return how often the program was called, where it never answered with a row."""
+        """Return how often the program was called if it never answered with a row, else nothing."""
         if self._answers or not self._calls:
             return {}
         return {"it was asked and answered with no row": (self._calls, self._calls)}
@@ -285,27 +289,27 @@ class Process(Component):
         self._link.stop()
 
     def report(self) -> dict[str, Any]:
-        """End the program, and say how often it was started again."""
+        """End the program and return how often it was restarted, or nothing if it never was."""
         self._link.stop()
         restarts = self._is_in.restarts
         return {"restarts": {self.name: restarts}} if restarts else {}
 
 
 class RewindableProcess(Process):
-    """A program that hands out its state and takes it back: its scene looks ahead."""
+    """A program that can save and restore its state, so that its scene can run ahead."""
 
     windowed = True
     rewindable = True
 
 
 class _Current:
-    """State of the program itself, which does not go back when the engine rewinds the block."""
+    """What belongs to the running program itself, and stays when the engine rewinds the block."""
 
     state: bytes | None = None
     restarts = 0
 
 
-def _message_fields(**values: Any) -> Any:
+def _single_row_batch(**values: Any) -> Any:
     import pyarrow as pa
 
     if not values:
@@ -313,8 +317,8 @@ def _message_fields(**values: Any) -> Any:
     return pa.RecordBatch.from_pydict({name: [value] for name, value in values.items()})
 
 
-def _batches(message: Message) -> Iterator[tuple[str, Any]]:
-    """Yield each table of a message, as a run records it."""
+def _recorded_batches(message: Message) -> Iterator[tuple[str, Any]]:
+    """Yield the name and the Arrow batch of each table that a run records of a message."""
     from dsa_des.record.arrow import to_arrow
 
     declared = derive_columns(type(message)).recorded

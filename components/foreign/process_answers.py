@@ -6,8 +6,8 @@ from typing import Any, cast
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.estimation.measurement import direction
-from components.foreign.reported_look import reported_looks
+from components.estimation.measurement import azimuth_elevation_and_variances
+from components.foreign.reported_look import detections_of_reports
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import (
     CONFIRMED,
@@ -15,7 +15,7 @@ from components.messages.state_tracks import (
     EXTRAS,
     STATUSES,
     StateTracks,
-    full_covariance,
+    covariance_matrices,
 )
 from components.messages.steering import Manoeuvres
 from components.messages.tracks import Tracks
@@ -40,7 +40,7 @@ _TEXTS = ("target", "track_status", "block", "contributors", "updated_by")
 def message_of_table(
     name: str, table: Any, tick: IntArray, roster: Roster, block: str, ticks_per_s: int
 ) -> Message:
-    """Return the message that a table of an answer is.
+    """Return the message that a table of the program's answer describes.
 
     Parameters
     ----------
@@ -72,12 +72,14 @@ def message_of_table(
         return _manoeuvres(numbers, tick, count)
     if name == "state_tracks":
         return _state_tracks(numbers, table, tick, block, ticks_per_s)
-    target = _targets(table, roster)
+    target = _target_indices(table, roster)
     if name == "detections":
         looks = {n: v[:1] if count else np.full(1, np.nan) for n, v in numbers.items()
                  if n.startswith("own_")}  # fmt: skip
         scan = np.full(1, -1, dtype=np.int64)
-        return reported_looks(tick, scan, np.array([0, count]), numbers, looks, target, roster)
+        return detections_of_reports(
+            tick, scan, np.array([0, count]), numbers, looks, target, roster
+        )
     return Tracks(
         tick=tick, offsets=np.array([0, count]), target=target,
         **{column: numbers[column] for column in _LINE},
@@ -88,9 +90,11 @@ def message_of_table(
 
 
 def _manoeuvres(numbers: Mapping[str, Any], tick: IntArray, count: int) -> Manoeuvres:
-    known = [column for column in Manoeuvres.parts() if column in numbers]
+    known = [column for column in Manoeuvres.manoeuvre_field_names() if column in numbers]
     told = Manoeuvres(np.repeat(tick, count), **{column: numbers[column] for column in known})
-    if not all(np.isfinite(getattr(told, column)).all() for column in Manoeuvres.parts()):
+    if not all(
+        np.isfinite(getattr(told, column)).all() for column in Manoeuvres.manoeuvre_field_names()
+    ):
         raise ValueError("finite numbers are needed")
     return told
 
@@ -98,10 +102,10 @@ def _manoeuvres(numbers: Mapping[str, Any], tick: IntArray, count: int) -> Manoe
 def _state_tracks(
     numbers: Mapping[str, FloatArray], table: Any, tick: IntArray, block: str, ticks_per_s: int
 ) -> StateTracks:
-    """Return tracks with states; what they do not say of direction follows from the state."""
+    """Return tracks from a table of states; lacking directions are computed from the states."""
     count, now_s = table.num_rows, float(tick[0]) / ticks_per_s
     state = np.stack([numbers[name] for name in STATE])
-    covariance = full_covariance(numbers, slice(None))
+    covariance = covariance_matrices(numbers, slice(None))
     ranged: BoolArray = np.asarray(np.isfinite(state).all(axis=0))
     for name in (*ORIGIN, *OWN_POSITION):
         if not np.isfinite(numbers[name]).all():
@@ -113,7 +117,7 @@ def _state_tracks(
             raise ValueError(f"column {name!r}: {what} is needed where there is a state")
     own = np.stack([numbers[name] for name in OWN_POSITION])
     with np.errstate(invalid="ignore"):
-        line = direction(state[:3] - own, covariance)
+        line = azimuth_elevation_and_variances(state[:3] - own, covariance)
         seen: dict[str, Any] = dict(zip(_DIRECTION, line, strict=True))
     seen |= {name: np.where(ranged, seen[name], np.nan) for name in _DIRECTION}
     seen |= {name: numbers[name] for name in _DIRECTION if name in numbers}
@@ -123,7 +127,7 @@ def _state_tracks(
     seen["azimuth_rad"] = seen["azimuth_rad"] % (2.0 * np.pi)
     one = np.ones(count, dtype=np.int64)
     return StateTracks(
-        tick=tick, offsets=np.array([0, count]), track=_track_numbers(numbers["track"]),
+        tick=tick, offsets=np.array([0, count]), track=_checked_track_numbers(numbers["track"]),
         track_status=_statuses(table), existence=numbers.get("existence", np.ones(count)),
         has_range=ranged, age_s=numbers.get("age_s", np.zeros(count)),
         state_s=numbers.get("state_s", np.full(count, now_s)),
@@ -136,7 +140,7 @@ def _state_tracks(
     )  # fmt: skip
 
 
-def _track_numbers(values: FloatArray) -> IntArray:
+def _checked_track_numbers(values: FloatArray) -> IntArray:
     if not ((values >= 1) & (values < 2**36) & (values == np.floor(values))).all():
         raise ValueError("column 'track': whole numbers from 1 are needed")
     numbers = values.astype(np.int64)
@@ -170,7 +174,7 @@ def _numbers(table: Any, column: str) -> Any:
         raise ValueError(f"column {column!r} is of {kind}: numbers are needed") from None
 
 
-def _targets(table: Any, roster: Roster) -> IntArray:
+def _target_indices(table: Any, roster: Roster) -> IntArray:
     place = {name: number for number, name in enumerate(roster.names)}
     if "target" not in table.column_names:
         return np.full(table.num_rows, -1, dtype=np.int64)

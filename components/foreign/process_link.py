@@ -25,13 +25,13 @@ _LAST_WORDS = 2000
 
 
 class ProcessError(Exception):
-    """A program died, hung or said what is no message; ends a command with exit code 3."""
+    """A program ended, took too long or sent a bad message; a command then exits with code 3."""
 
     exit_code = 3
 
 
 def frame(table: str, batch: Any, about: Mapping[str, str]) -> list[Any]:
-    """Return a record batch as a frame: its length, and the stream."""
+    """Return a record batch as the two parts of a frame: its length, and an Arrow stream."""
     import pyarrow as pa
 
     sink = pa.BufferOutputStream()
@@ -44,7 +44,7 @@ def frame(table: str, batch: Any, about: Mapping[str, str]) -> list[Any]:
 
 
 class ProcessLink:
-    """One program, started by its first call.
+    """The pipes to one program, which is started by the first call.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class ProcessLink:
         return self._process is not None
 
     def start(self) -> None:
-        """Start the program in a group of its own, and what ends it when we are gone."""
+        """Start the program in its own process group, which ends also when this process dies."""
         self._words = bytearray()
         try:
             child = ChildProcess(
@@ -85,7 +85,7 @@ class ProcessLink:
         self._child = self._process = None
 
     def ask(self, parts: Iterable[Any], deadline_s: float) -> list[tuple[dict[str, str], Any]]:
-        """Send frames and return those of the answer: metadata and table of each.
+        """Send frames, wait, and return the answer's frames as pairs of metadata and table.
 
         Raises
         ------
@@ -157,7 +157,7 @@ class ProcessLink:
         reader.add(content)
 
     def _read_stderr(self) -> bool:
-        """Read its standard error; return whether more may follow."""
+        """Read what has arrived on the program's standard error; return False once it is closed."""
         with suppress(BlockingIOError):
             said = os.read(self._process.stderr.fileno(), _CHUNK)
             self._words += said
@@ -184,7 +184,7 @@ class ProcessLink:
 
 
 class _Frames:
-    """Frames of an answer, as their bytes come."""
+    """Collects the frames of an answer as their bytes arrive."""
 
     def __init__(self) -> None:
         self._frames: list[bytearray] = []

@@ -12,13 +12,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.atmosphere.pressure_altitude import scene_air
-from components.foreign.reported_look import reported_looks
+from components.foreign.reported_look import detections_of_reports
 from components.formats.measurement_file import Measurements, read_measurements
 from components.formats.recorded.known_kinds import captured_asterix
 from components.messages.columns import OWN_VELOCITY, POSE
-from components.messages.detections import EXTRAS, Detections, SensorOffer, promises_of_looks
+from components.messages.detections import EXTRAS, Detections, SensorOffer, report_interval_promises
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import (
@@ -80,7 +80,7 @@ class RecordedSensorParameters(Parameters):
 
     @property
     def place(self) -> tuple[float, float, float] | None:
-        """Where the radar is, as the scene says it: latitude, longitude (deg), altitude (m)."""
+        """The radar's latitude, longitude (deg), altitude (m) as the scene states, or None."""
         lat, lon, alt = self.radar_lat_deg, self.radar_lon_deg, self.radar_alt_m
         return None if lat is None or lon is None or alt is None else (lat, lon, alt)
 
@@ -101,7 +101,7 @@ class RecordedSensorParameters(Parameters):
 
 
 class RecordedSensor(Component):
-    """Reports what was measured, at the instants at which it was, as late as it came.
+    """Sends recorded measurements at the times they were made, to arrive as late as they did.
 
     Rows are dated with ``time_s`` and arrive at ``arrival_s`` (``latency_s`` and delays of wires
     come on top), so what comes after it runs as after the sensor itself. Looks wait their turn one
@@ -134,7 +134,7 @@ class RecordedSensor(Component):
         return measured
 
     def natural_duration_s(self) -> Fraction:
-        """Return whole seconds in which the last look has come."""
+        """Return the duration in whole seconds by which the last recorded look has arrived."""
         return Fraction(math.floor(self._read_measurements.arrival_s.max()) + 1)
 
     def offer(self, port: str) -> SensorOffer:
@@ -143,7 +143,7 @@ class RecordedSensor(Component):
             self._read_measurements.time_s
         )
         per_s = self.context.ticks_per_s
-        stated = self._sensor_offer or self._offer_of_rows()
+        stated = self._sensor_offer or self._offer_from_measurements()
         return replace(
             stated,
             clock=None,
@@ -173,7 +173,7 @@ class RecordedSensor(Component):
             raise ValueError(f"block is {block!r}: in {path} it is no sensor")
         return offer
 
-    def _offer_of_rows(self) -> SensorOffer:
+    def _offer_from_measurements(self) -> SensorOffer:
         entries = self._read_measurements.entries
         same: dict[str, Any] = {}
         for name in _VARIANCES:
@@ -188,9 +188,11 @@ class RecordedSensor(Component):
         )  # fmt: skip
 
     def _promises_of_looks(self) -> tuple[tuple[float, float], ...]:
-        """Return what looks as far apart as most here promise."""
+        """Return the promises (`SensorOffer`) of a sensor that looks at the median interval of the
+        recorded looks; none for a single look.
+        """
         apart_s = np.diff(np.sort(self._read_measurements.time_s))
-        return promises_of_looks(float(np.median(apart_s))) if len(apart_s) else ()
+        return report_interval_promises(float(np.median(apart_s))) if len(apart_s) else ()
 
     def _has(self, name: str) -> bool:
         values = self._read_measurements.entries.get(name)
@@ -209,7 +211,7 @@ class RecordedSensor(Component):
                 f"{measured.time_s[near[0] + 1]:.12g} s fall on one tick of the scene"
             )
         names = dict.fromkeys(name for name in measured.target if name is not None)
-        rosters = known_targets(self.context)
+        rosters = offered_rosters(self.context)
         self._roster = (
             rosters[0] if rosters else Roster.from_pairs([(n, Aircraft()) for n in names])
         )
@@ -233,14 +235,14 @@ class RecordedSensor(Component):
         self._rates = self._has("range_rate_m_s") and set(OWN_VELOCITY) <= set(measured.looks)
 
     def process(self, env: Any) -> Generator[Any, None, None]:
-        """Send every look at its instant, to leave when it came."""
+        """Send every recorded look at its own time, to arrive when it arrived in the recording."""
         for number, (tick, arrives) in enumerate(
             zip(self._tick.tolist(), self._arrives.tolist(), strict=True)
         ):
             yield env.timeout(tick - env.now)
-            env.send(self._look(number), leaves=arrives)
+            env.send(self._detections_of_look(number), leaves=arrives)
 
-    def _look(self, number: int) -> Detections:
+    def _detections_of_look(self, number: int) -> Detections:
         measured = self._read_measurements
         rows = slice(int(measured.offsets[number]), int(measured.offsets[number + 1]))
         entries = {name: values[rows] for name, values in measured.entries.items()}
@@ -254,7 +256,7 @@ class RecordedSensor(Component):
             if set(POSE) <= set(entries):
                 more["own_of_entries"] = {name: entries[name] for name in POSE}
         unsaid = set(EXTRAS) - set(self._extras)
-        return reported_looks(
+        return detections_of_reports(
             tick, measured.scan[number : number + 1], np.array([0, len(self._target[rows])]),
             {name: values for name, values in entries.items() if name not in unsaid},
             look, self._target[rows], self._roster, **more,

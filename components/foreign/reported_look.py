@@ -14,7 +14,7 @@ from dsa_des.arrays.types import IntArray
 TRUE_LINE = ("true_azimuth_rad", "true_elevation_rad", "true_range_m")
 
 
-def reported_looks(
+def detections_of_reports(
     tick: IntArray,
     scan: IntArray,
     offsets: IntArray,
@@ -24,7 +24,7 @@ def reported_looks(
     roster: Roster,
     **more: Any,
 ) -> Detections:
-    """Return the message of some looks.
+    """Return a `Detections` message of several looks, a row each, from reported columns.
 
     Parameters
     ----------

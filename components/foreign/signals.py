@@ -11,7 +11,7 @@ from dsa_des.block.message import Message, Text, column, static
 
 
 class Words:
-    """A text for each entry of a message."""
+    """Texts, one for each entry of a message."""
 
     def __init__(self, words: Sequence[str]) -> None:
         self.words = list(words)
@@ -46,7 +46,7 @@ def _text(message: Any) -> Text:
 
 @dataclass(eq=False)
 class Signals(Message):
-    """What a foreign part gave at each of its communication points.
+    """The values of an external part's outputs at each of its communication points.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ class Signals(Message):
         cls, tick: IntArray, layout: Sequence[tuple[int, int]], values: FloatArray,
         words: Sequence[str], names: tuple[str, ...], units: tuple[str, ...],
     ) -> Self:  # fmt: skip
-        """Return the message in which each row has the same entries.
+        """Return signals with the same entries in every row, from a table (rows, entries).
 
         Parameters
         ----------

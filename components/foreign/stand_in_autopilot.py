@@ -10,7 +10,7 @@ import socket
 import sys
 from typing import Any
 
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 _NEAR_M, _LEVEL_M, _AHEAD_S, _TURN_RAD, _PAUSE_S = 600.0, 150.0, 60.0, math.radians(45.0), 120.0
 _M_PER_E7 = 111_200.0 / 1e7
@@ -18,7 +18,7 @@ _SILENT_S = 60.0
 
 
 class StandIn:
-    """Replies to datagrams: each state of the ownship by an attitude and a position."""
+    """A simulated autopilot: answers each received ownship state with attitude and position."""
 
     def __init__(self) -> None:
         dialect = import_extra("pymavlink.dialects.v20.common", "mavlink", "the stand-in autopilot")
@@ -29,17 +29,17 @@ class StandIn:
         self._free_from_s = 0.0
 
     def reply(self, datagram: bytes) -> list[bytes]:
-        """Return the datagrams that answer one."""
+        """Return the datagrams with which the autopilot answers a datagram."""
         found = []
         for message in self._link.parse_buffer(datagram) or []:
             if message.get_type() == "ADSB_VEHICLE":
                 self._others.append(message)
             elif message.get_type() == "HIL_STATE_QUATERNION":
-                found += self._fly(message)
+                found += self._reply_to_state(message)
                 self._others = []
         return found
 
-    def _fly(self, own: Any) -> list[bytes]:
+    def _reply_to_state(self, own: Any) -> list[bytes]:
         time_s, level = own.time_usec / 1e6, math.hypot(own.vx, own.vy)
         if self._course_rad is None:
             self._course_rad = math.atan2(own.vy, own.vx)
@@ -73,7 +73,8 @@ def _passes_near(own: Any, one: Any) -> bool:
 
 
 def serve(port: int) -> set[Any]:
-    """Answer whoever sends to a port of this machine, each by an autopilot of its own; return who.
+    """Answer datagrams at a local port, by a stand-in autopilot for each sender, and return the
+    senders' addresses at the end.
 
     It ends by an empty datagram, or when nothing has come for a minute.
     """

@@ -19,7 +19,7 @@ from components.formats.asterix_records import (
     read_records,
 )
 from components.formats.recording import Recording
-from components.formats.sample_columns import Altitude, SampleColumn, with_velocity
+from components.formats.sample_columns import Altitude, SampleColumn, convert_to_enu_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems, TrafficFileError
 from components.geometry import enu_to_geodetic, radii_of_curvature, wrap_pi
@@ -35,7 +35,7 @@ _HEIGHTS: Mapping[Altitude, tuple[str, ...]] = {
 
 @dataclass(frozen=True)
 class RadarPlots:
-    """What radars reported, scan by scan.
+    """The plots that radars reported, grouped by scan.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ class RadarPlots:
     notes: list[str]
 
 
-def record_asterix(
+def recording_of_asterix(
     problems: Problems,
     data: bytes,
     altitude: Altitude | None = None,
@@ -81,7 +81,7 @@ def record_asterix(
     least: int = 1,
     place: tuple[float, float, float] | None = None,
 ) -> Recording:
-    """Return the aircraft of data blocks: system tracks (062) and ADS-B reports (021).
+    """Return a `Recording` from ASTERIX data blocks: system tracks (062), ADS-B reports (021).
 
     Where there are none, those of radars' plots (048) that say whose they are, each by the radar
     that saw it first; `place` is where radars are that do not say it (latitude, longitude, m).
@@ -96,10 +96,10 @@ def record_asterix(
     day_s = 0.0
     if of_day_s is not None and records:
         day_s = DAY_S * round((of_day_s - records[0].time_s) / DAY_S)
-    names = _names(records)
+    names = _aircraft_names(records)
     if not names:
-        records = _identify_plots(problems, records, place, warnings)
-        names = _names(records)
+        records = _plots_as_reports(problems, records, place, warnings)
+        names = _aircraft_names(records)
     kinds: list[Altitude] = ["barometric", "geometric"] if altitude is None else [altitude]
     heights = dict(zip(("alt", "alt instead"), kinds, strict=False))
     headers = ("time", "lat", "lon", *(f"{kind} altitude" for kind in kinds), *_MOVES)
@@ -119,7 +119,7 @@ def record_asterix(
     for k, record in enumerate(records):
         if record.category not in _AIRCRAFT:
             continue
-        mine = rows.setdefault(_key(record), {})
+        mine = rows.setdefault(_aircraft_key(record), {})
         sample = _sample(record, kinds)
         if abs(sample[1]) > _POLE_DEG:
             problems.fail(
@@ -132,7 +132,7 @@ def record_asterix(
         # Two records of one quantum of time are one instant: the later one counts.
         samples.pop(-1 if before is None else before, None)
         mine[record.time_s] = k
-        samples[k] = names[_key(record)], sample
+        samples[k] = names[_aircraft_key(record)], sample
     for k, (name, sample) in samples.items():
         table.add_numbers(k + 1, name, sample)
     if not names:
@@ -141,18 +141,18 @@ def record_asterix(
         ownship = _OWNSHIP
     return table.recording(
         ownship,
-        lambda columns: {**with_velocity(columns), "time": columns["time"] + day_s},
+        lambda columns: {**convert_to_enu_velocity(columns), "time": columns["time"] + day_s},
         kind="ASTERIX", units="the units of its items",
     )  # fmt: skip
 
 
-def _identify_plots(
+def _plots_as_reports(
     problems: Problems,
     records: list[AsterixRecord],
     place: tuple[float, float, float] | None,
     warnings: list[str],
 ) -> list[AsterixRecord]:
-    """Return plots that say whose they are as reports: by address, else as a radar's tracks."""
+    """Return radar plots that identify aircraft as ADS-B reports (by address) or system tracks."""
     plots = [one for one in records if one.category == PLOTS]
     named = [one for one in plots if {"number", "track", "code"} & one.values.keys()]
     seen = [
@@ -168,11 +168,11 @@ def _identify_plots(
     for one in records:
         if one.category == SERVICE and {"lat_deg", "lon_deg", "alt_m"} <= one.values.keys():
             lat_deg, lon_deg, alt_m = (one.values[name] for name in ("lat_deg", "lon_deg", "alt_m"))
-            places.setdefault(_source(one), (lat_deg, lon_deg, alt_m))
+            places.setdefault(_radar_code(one), (lat_deg, lon_deg, alt_m))
     first: dict[int, str] = {}
     kept, at = [], []
     for one in seen:
-        values, source = dict(one.values), _source(one)
+        values, source = dict(one.values), _radar_code(one)
         radar = places.get(source, place)
         if radar is None:
             problems.fail(
@@ -248,18 +248,18 @@ def read_asterix_plots(
     except InputFileError as error:
         raise TrafficFileError(str(path), [str(error)]) from None
     records, notes = read_records(Path(path), data)
-    radars = sorted({_source(r) for r in records if r.category == PLOTS})
+    radars = sorted({_radar_code(r) for r in records if r.category == PLOTS})
     if not radars:
         raise TrafficFileError(str(path), ["there are no plots of a radar (048) in it"])
     start_s = min(record.time_s for record in records)
     code = {name: k for k, name in enumerate(radars)}
-    marked = {_source(r) for r in records if r.category == SERVICE}
+    marked = {_radar_code(r) for r in records if r.category == SERVICE}
     scans: list[tuple[int, float, float, float, float]] = []
     current: dict[str, int] = {}
     plots: list[tuple[float, ...]] = []
     # Out of order within a turn, as they are sent sector by sector.
     for record in sorted(records, key=lambda one: one.time_s):
-        radar = _source(record)
+        radar = _radar_code(record)
         if radar not in code or record.category not in (SERVICE, PLOTS):
             continue
         values, now_s = record.values, record.time_s - start_s
@@ -278,7 +278,7 @@ def read_asterix_plots(
             plots.append((current[radar], now_s, turned, alt_m, values["range_m"], rate_m_s))
     scan, time_s, azimuth, height, far_m, rate = np.array(plots).reshape(-1, 6).T
     radar_of, scan_s, *here = np.array(scans).T
-    lat, lon, alt = _places(radar_of, np.array(here), place)
+    lat, lon, alt = _radar_positions(radar_of, np.array(here), place)
     of = scan.astype(np.int64)
     return RadarPlots(
         radars, start_s, radar_of.astype(np.int64), scan_s, lat, lon, alt, of, time_s,
@@ -286,10 +286,12 @@ def read_asterix_plots(
     )  # fmt: skip
 
 
-def _places(
+def _radar_positions(
     radar_of: FloatArray, said: FloatArray, place: tuple[float, float, float] | None
 ) -> FloatArray:
-    """Return where each scan's radar is, (3, scans), from what its markers say of it."""
+    """Return the radar's position at each scan, (3, scans); gaps take that of its marker before, of
+    its first marker, or ``place``.
+    """
     filled = said.copy()
     for radar in np.unique(radar_of):
         mine = np.flatnonzero(radar_of == radar)
@@ -306,7 +308,7 @@ def _elevations(
     azimuth_rad: FloatArray, far_m: FloatArray, to_m: FloatArray, lat_deg: FloatArray,
     from_m: FloatArray,
 ) -> FloatArray:  # fmt: skip
-    """Return at which elevation a height is met at a slant range.
+    """Return the elevation (rad) at which a line of a given slant range reaches a given height.
 
     The ellipsoid is taken as the sphere that touches it along the line (Euler's radius).
     """
@@ -319,29 +321,29 @@ def _elevations(
     return np.arcsin(np.clip(sine, -1.0, 1.0))
 
 
-def _source(record: AsterixRecord) -> str:
+def _radar_code(record: AsterixRecord) -> str:
     return f"{record.values.get('sac', 0)}/{record.values.get('sic', 0)}"
 
 
-def _key(record: AsterixRecord) -> tuple[object, ...]:
-    """Return what tells one aircraft of a file from another."""
+def _aircraft_key(record: AsterixRecord) -> tuple[object, ...]:
+    """Return a key that all records of one aircraft in a file have in common."""
     if record.category == ADS_B and "number" in record.values:
         return ADS_B, record.values["number"]  # an address is one aircraft's, whoever received it
-    return record.category, _source(record), record.values.get("number", 0)
+    return record.category, _radar_code(record), record.values.get("number", 0)
 
 
-def _names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
-    """Return a name for each aircraft: its identification where no other has the same."""
+def _aircraft_names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
+    """Return each aircraft key's name: its identification, numbered if aircraft share it."""
     said: dict[tuple[object, ...], str] = {}
     for record in records:
         if record.category in _AIRCRAFT and record.values.get("name"):
-            said.setdefault(_key(record), record.values["name"])
+            said.setdefault(_aircraft_key(record), record.values["name"])
     named = list(said.values())
     result = {}
     for record in records:
-        if record.category not in _AIRCRAFT or (key := _key(record)) in result:
+        if record.category not in _AIRCRAFT or (key := _aircraft_key(record)) in result:
             continue
-        number = f"{key[-1]:06X}" if key[0] == ADS_B else f"{_source(record)}/{key[-1]}"
+        number = f"{key[-1]:06X}" if key[0] == ADS_B else f"{_radar_code(record)}/{key[-1]}"
         name = said.get(key)
         result[key] = number if name is None else name if named.count(name) == 1 else (
             f"{name} {number}"
@@ -350,7 +352,9 @@ def _names(records: list[AsterixRecord]) -> dict[tuple[object, ...], str]:
 
 
 def _sample(record: AsterixRecord, kinds: Sequence[Altitude]) -> tuple[float, ...]:
-    """Return time, position and velocity of a record, NaN for what it does not say."""
+    """Return a record's time, latitude, longitude, heights and velocity (east, north, up); NaN for
+    what it does not contain.
+    """
     values = record.values
     items = [("lat_deg", "coarse_lat_deg"), ("lon_deg", "coarse_lon_deg")]
     position = [

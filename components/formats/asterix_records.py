@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 from components.arguments.units import FOOT_M, NAUTICAL_MILE_M
 from components.formats.text_rows import TrafficFileError
 from dsa_des.errors import UsageError
-from dsa_des.errors.extras import import_extra
+from dsa_des.errors.optional_libraries import import_extra
 
 DAY_S = 86400.0
 #: Reports of a radar's own service, plots, system tracks, and ADS-B reports.
@@ -30,7 +30,8 @@ _CLIMB_MPS = 6.25 * FOOT_M / 60.0
 
 
 class _Field(NamedTuple):
-    """Where a quantity stands (item, part of it), its least bit, how many bits, and its sign.
+    """How a quantity is stored in ASTERIX: its item and the part of it, the value of one bit, the
+    number of bits, and whether it is signed.
 
     A part of a part is ``CAL/CAL``.
     """
@@ -130,7 +131,7 @@ class AsterixRecord(NamedTuple):
 
 
 def callsign(name: str) -> str | None:
-    """Return the first eight letters and digits of a name, an identification; None without any."""
+    """Return a name's first 8 ASCII letters and digits, upper case, as callsign; None if none."""
     plain = "".join(c for c in name.upper() if c.isascii() and c.isalnum())
     return plain[:8] or None
 
@@ -140,7 +141,7 @@ def write_records(records: Sequence[AsterixRecord]) -> bytes:
 
     UsageError says which quantity does not fit into its bits.
     """
-    cats = _categories()
+    cats = _category_definitions()
     blocks: list[tuple[tuple[int, float], list[Any]]] = []
     for record in sorted(records, key=lambda r: (r.time_s, ORDER[r.category])):
         kind = cats[record.category]
@@ -156,8 +157,8 @@ def write_records(records: Sequence[AsterixRecord]) -> bytes:
 _MOST_OF_A_BLOCK = 1000
 
 
-def _categories() -> dict[int, Any]:
-    """Return the newest edition of each category that we know."""
+def _category_definitions() -> dict[int, Any]:
+    """Return the library's newest edition of each supported ASTERIX category, by its number."""
     generated = import_extra("asterix.generated", "asterix", "ASTERIX")
     return {number: generated.manifest["CATS"][number][-1] for number in FIELDS}
 
@@ -223,7 +224,7 @@ _ITEMS: Mapping[int, Mapping[str, Any]] = {
 
 
 def _items(record: AsterixRecord) -> dict[str, Any]:
-    """Return a record's items as the library makes them."""
+    """Return a record's items in the form from which the asterix library builds a record."""
     values = {**record.values, "time_of_day_s": record.time_s}
     raw = {
         f"={name}": _raw_value(record, name, field, values[name])
@@ -238,7 +239,7 @@ def _items(record: AsterixRecord) -> dict[str, Any]:
 
 
 def _fill_pattern(pattern: Any, raw: Mapping[str, Any]) -> Any:
-    """Return a pattern of `_ITEMS` with quantities in it; KeyError where one is not given."""
+    """Return a pattern of `_ITEMS` with quantities filled in; KeyError if one is missing."""
     if isinstance(pattern, tuple):
         return tuple(_fill_pattern(part, raw) for part in pattern)
     if isinstance(pattern, dict):
@@ -247,7 +248,7 @@ def _fill_pattern(pattern: Any, raw: Mapping[str, Any]) -> Any:
 
 
 def _raw_value(record: AsterixRecord, name: str, field: _Field, value: Any) -> Any:
-    """Return a quantity as the whole number that its bits hold, or a text as it is."""
+    """Return a quantity as the unsigned integer that its bits hold; a name stays a text."""
     if name == "name":
         return value
     steps = round(value / field.step)
@@ -267,11 +268,11 @@ def _raw_value(record: AsterixRecord, name: str, field: _Field, value: Any) -> A
 
 
 def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
-    """Return the records of the categories that we know, each once, in order, and notes.
+    """Return supported categories' records in file order, each once, and notes on the rest.
 
     TrafficFileError says at which byte what is no data block or no record begins.
     """
-    cats, readers = _categories(), _readers()
+    cats, readers = _category_definitions(), _category_readers()
     records: list[AsterixRecord] = []
     left_out: dict[int, int] = {}
     now_s = math.nan
@@ -321,7 +322,7 @@ def _block_error(path: Path, at: int, problem: str) -> TrafficFileError:
 
 
 def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, bytes]]:
-    """Yield the byte at which each data block begins, its category, and its records."""
+    """Yield each data block's first byte position, its category, and its records' bytes."""
     at = 0
     if not data:
         raise TrafficFileError(str(path), ["the file is empty: data blocks of ASTERIX are needed"])
@@ -343,8 +344,8 @@ _LETTERS = ["", *map(chr, range(65, 91)), *[""] * 5, " ", *[""] * 15, *"01234567
 
 
 @cache
-def _readers() -> dict[int, _Reader]:
-    """Return what reads a record of each category, made of what the library says of its items.
+def _category_readers() -> dict[int, _Reader]:
+    """Return a record reader for each category, built from the library's item descriptions.
 
     Its own objects of every bit would take 0.6 ms a record.
     """
@@ -369,32 +370,32 @@ def _readers() -> dict[int, _Reader]:
 
     def reader_of(kind: Any, fields: Mapping[str, Any], path: str) -> _Reader:
         if issubclass(kind, base.Compound):
-            return _compound([
+            return _compound_reader([
                 one and reader_of(one.cv_rule.cv_variation, fields, f"{path}/{one.cv_name}")
                 for one in kind.cv_items_list
             ])  # fmt: skip
         if issubclass(kind, base.Explicit):
             return lambda data, at, _: at + (data[at] or len(data))
         if issubclass(kind, base.Repetitive):
-            return _repetitive(kind.cv_rep_bytes, kind.cv_variation.cv_bit_size)
+            return _repetition_skipper(kind.cv_rep_bytes, kind.cv_variation.cv_bit_size)
         if issubclass(kind, base.Extended):
             extents = [sum(1 if one is None else one[1] for one in part) // 8
                        for part in kind.cv_items_list]  # fmt: skip
             whole = [one for part in kind.cv_items_list for one in part]
-            return _fixed(extents, takes_of(whole, fields, path, 0))
+            return _fixed_reader(extents, takes_of(whole, fields, path, 0))
         size = kind.cv_bit_size
         if issubclass(kind, base.Group):
-            return _fixed([size // 8], takes_of(kind.cv_items_list, fields, path, 0))
+            return _fixed_reader([size // 8], takes_of(kind.cv_items_list, fields, path, 0))
         mine = [(fields[path][0], size, size, fields[path][1])] if path in fields else []
-        return _fixed([size // 8], mine)
+        return _fixed_reader([size // 8], mine)
 
     readers = {}
-    for category, kind in _categories().items():
+    for category, kind in _category_definitions().items():
         fields = {
             "/".join(("", one.item, *filter(None, [one.part]))): (name, one)
             for name, one in FIELDS[category].items()
         }
-        readers[category] = _compound([
+        readers[category] = _compound_reader([
             reader_of(one.cv_non_spare.cv_rule.cv_variation, fields,
                       f"/{one.cv_non_spare.cv_name}")
             if issubclass(one, base.UapItem) else None
@@ -403,8 +404,8 @@ def _readers() -> dict[int, _Reader]:
     return readers
 
 
-def _compound(items: Sequence[_Reader | None]) -> _Reader:
-    """Return what reads items of which bits say which are there."""
+def _compound_reader(items: Sequence[_Reader | None]) -> _Reader:
+    """Return a reader of a compound item, whose leading bits tell which parts are present."""
 
     def read(data: bytes, at: int, values: dict[str, Any]) -> int:
         begin = at
@@ -423,8 +424,8 @@ def _compound(items: Sequence[_Reader | None]) -> _Reader:
     return read
 
 
-def _repetitive(counted: int | None, bits: int) -> _Reader:
-    """Return what passes over what comes several times: counted, or while its last bit is set."""
+def _repetition_skipper(counted: int | None, bits: int) -> _Reader:
+    """Return a reader that skips a repeated item, by a count or while its last bit is set."""
 
     def read(data: bytes, at: int, _: dict[str, Any]) -> int:
         if counted is not None:
@@ -437,8 +438,8 @@ def _repetitive(counted: int | None, bits: int) -> _Reader:
     return read
 
 
-def _fixed(extents: Sequence[int], takes: Sequence[_Take]) -> _Reader:
-    """Return what reads an item of so many bytes, each further extent where the last bit is set."""
+def _fixed_reader(extents: Sequence[int], takes: Sequence[_Take]) -> _Reader:
+    """Return a reader of a fixed-length item, which continues where its last bit is set."""
 
     def read(data: bytes, at: int, values: dict[str, Any]) -> int:
         end = at + extents[0]

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.receiver_logs import UNKNOWN_JSON, log_of
+from components.formats.receiver_logs import UNKNOWN_JSON, parse_receiver_log
 from components.formats.recording import Recording
 from components.formats.reports import build_recording
 from components.formats.sample_columns import (
@@ -20,14 +20,14 @@ from components.formats.sample_columns import (
     Altitude,
     ColumnSpec,
     SampleColumn,
-    complete_velocity,
-    indices_of,
+    column_indices,
+    convert_to_enu_velocity,
+    first_complete_velocity,
     is_missing,
     name_and_unit,
     resolve_epoch_unit,
     time_parser,
     unit_factor,
-    with_velocity,
 )
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
@@ -128,35 +128,35 @@ def read_csv(
     """
     problems = Problems(str(path))
     data = read_content(Path(path), problems)
-    log = log_of(problems, data)
+    log = parse_receiver_log(problems, data)
     if log is not None:
         return build_recording(problems, log, ownship, altitude).flights()
     if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
         problems.fail(UNKNOWN_JSON)
     lines = iterate_lines(text_of(data, problems))
     del data  # of many rows it is not held beside their samples
-    return record_table(problems, lines, ownship, altitude).flights()
+    return recording_of_table(problems, lines, ownship, altitude).flights()
 
 
-def record_table(
+def recording_of_table(
     problems: Problems,
     lines: Iterator[tuple[int, str]],
     ownship: str | None = None,
     altitude: Altitude | None = None,
     stem: str | None = None,
 ) -> Recording:
-    """Return the aircraft of a table, see `read_csv`: two or more, or any, called as its `stem`
-    where there is no column of names.
+    """Return a `Recording` of the aircraft in a table, at least two, or with ``stem`` at least one,
+    which is called so if no column names it.
     """
     (header_line, header_text), body = _header_and_rows(problems, strip_frame(lines))
     header_text = header_text.lstrip("#").strip(" ")
     delimiter = next((d for d in (",", ";", "\t", "|") if d in header_text), " ")
     ((_, headers),) = quoted_rows(iter([(header_line, header_text)]), delimiter)
     rows = quoted_rows((one for one in body if not one[1].startswith("#")), delimiter)
-    return record_rows(problems, headers, header_line, rows, ownship, altitude, stem)
+    return recording_of_rows(problems, headers, header_line, rows, ownship, altitude, stem)
 
 
-def record_rows(
+def recording_of_rows(
     problems: Problems,
     headers: list[str],
     header_line: int,
@@ -166,8 +166,8 @@ def record_rows(
     stem: str | None = None,
     kind: str = "a table",
 ) -> Recording:
-    """Return the aircraft of rows of cells, each with its line, see `record_table`."""
-    at, position = len(headers), _single_position(headers)
+    """Return a `Recording` of a table's aircraft, given as rows of cells with line numbers."""
+    at, position = len(headers), _joint_position_index(headers)
     is_nameless = stem is not None and _KNOWN_NAMES.isdisjoint(
         name_and_unit(header)[0] for header in headers
     )
@@ -178,12 +178,15 @@ def record_rows(
     columns, notes = _find_columns(problems, headers, header_line, altitude)
     identity, time = columns.pop("id").index, columns["time"].index
     plain = [name_and_unit(header)[0] for header in headers]
-    is_address, is_zero_ground = plain[identity] in _ADDRESSES, _family(plain) == _ZERO_ON_GROUND
+    is_address, is_zero_ground = (
+        plain[identity] in _ADDRESSES,
+        _writer_of_columns(plain) == _ZERO_ON_GROUND,
+    )
     high = columns["alt"].index
     date = next((plain.index(name) for name in _DATES if name in plain), None)
     # Where a position's own time is not known, that of its row must do.
     other = next((plain.index(name) for name in _CLOCKS if name in plain), time)
-    ahead = _until_a_time(rows, time, other)
+    ahead = _rows_until_first_time(rows, time, other)
     if ahead and (begins := _time_cell(ahead[-1][1], time, other)):
         columns["time"] = resolve_epoch_unit(columns["time"], begins, headers[time], notes)
     table = SampleTable(
@@ -196,7 +199,7 @@ def record_rows(
     nameless = 0
     rows = chain(ahead, rows)
     if plain[time] == _OF_MESSAGES:
-        rows = _first_of_seconds(rows, identity, columns, table.notes.warnings)
+        rows = _drop_rows_within_second(rows, identity, columns, table.notes.warnings)
     for number, row in rows:
         if len(row) == at + 1 and not row[-1]:
             row.pop()  # a comma at the end
@@ -221,7 +224,7 @@ def record_rows(
     height = columns["alt"].header
     units = next((note.partition(": ")[0] for note in notes if f"{height} in " in note), "")
     recording = table.recording(
-        ownship, with_velocity, kind=kind, units=units or "the units of its header"
+        ownship, convert_to_enu_velocity, kind=kind, units=units or "the units of its header"
     )
     if f"{height} in m" in units and _seem_feet(recording):
         said = "all its numbers are multiples of 25, as feet are"
@@ -235,11 +238,11 @@ def record_rows(
 _OF_MESSAGES = "networktime"
 
 
-def _first_of_seconds(
+def _drop_rows_within_second(
     rows: Iterator[tuple[int, list[str]]], identity: int, columns: Mapping[str, SampleColumn],
     warnings: list[str],
 ) -> Iterator[tuple[int, list[str]]]:  # fmt: skip
-    """Yield rows with a position of one name that are at least a second apart."""
+    """Yield the rows without positions less than a second after the last of the same name."""
     time, lat, lon = (columns[key].index for key in ("time", "lat", "lon"))
     parse, last, left_out = time_parser(columns["time"]), dict[str, float](), 0
     for number, row in rows:
@@ -260,10 +263,10 @@ def _first_of_seconds(
 _MOST_AHEAD = 1000
 
 
-def _until_a_time(
+def _rows_until_first_time(
     rows: Iterator[tuple[int, list[str]]], time: int, other: int
 ) -> list[tuple[int, list[str]]]:
-    """Return the rows up to the first with a time, whose unit shows by it."""
+    """Return the rows up to the first with a time, which can tell the unit of times."""
     ahead: list[tuple[int, list[str]]] = []
     for one in rows:
         ahead.append(one)
@@ -290,15 +293,15 @@ _KNOWN_NAMES = frozenset(_IDENTITIES)
 _KNOWN = {name for spec in COLUMNS.values() for name in spec.names}
 
 
-def known_among(headers: Iterable[str]) -> int:
-    """Return how many names of columns are of those that a table may have."""
+def count_known_columns(headers: Iterable[str]) -> int:
+    """Return how many different headers are names of columns that a table may have."""
     return len({name_and_unit(header)[0] for header in headers} & _KNOWN)
 
 
 def _header_and_rows(
     problems: Problems, lines: Iterator[tuple[int, str]]
 ) -> tuple[tuple[int, str], Iterator[tuple[int, str]]]:
-    """Return the line that names the columns, and those below it.
+    """Return the line with the column names, and an iterator over the lines after it.
 
     It is the first that is no comment, or the comment before it where only that names columns.
     """
@@ -318,8 +321,8 @@ def _header_and_rows(
     problems.fail("the file is empty: a row of column names and rows of samples are needed")
 
 
-def _single_position(headers: list[str]) -> int | None:
-    """Return the column that holds latitude and longitude, where none holds one of them alone."""
+def _joint_position_index(headers: list[str]) -> int | None:
+    """Return the index of a joint latitude-longitude column, or None if none or separate ones."""
     plain = [name_and_unit(header)[0] for header in headers]
     if any(name in plain for name in COLUMNS["lat"].names):
         return None
@@ -329,14 +332,14 @@ def _single_position(headers: list[str]) -> int | None:
 def _find_columns(
     problems: Problems, headers: list[str], line: int, altitude: Altitude | None
 ) -> tuple[dict[str, SampleColumn], list[str]]:
-    """Match the headers, with notes on them; a missing required column ends the reading."""
+    """Return the columns by quantity, and notes; TrafficFileError if a required one is missing."""
     parsed = [name_and_unit(header) for header in headers]
     names = [name for name, _ in parsed]
-    specs = _specs(names, altitude)
+    specs = _column_specs(names, altitude)
     columns: dict[str, SampleColumn] = {}
-    indices = indices_of(specs, names)
+    indices = column_indices(specs, names)
     shown = shown_columns(headers, bool(indices))
-    family = _family(names)
+    family = _writer_of_columns(names)
     notes, taken = [], []
     for quantity, spec in specs.items():
         if quantity not in indices:
@@ -361,21 +364,23 @@ def _find_columns(
     if taken:
         why = f"as {family} writes it" if family else "no unit is given"
         notes.append(f"{', '.join(taken)}: {why}")
-    if "trk" not in columns and not complete_velocity(columns) and "yaw" in columns:
+    if "trk" not in columns and not first_complete_velocity(columns) and "yaw" in columns:
         # Receivers that log velocity call the track "heading".
         columns["trk"] = columns["yaw"]
-    kept = complete_velocity(columns)
+    kept = first_complete_velocity(columns)
     for quantity in {q for parts in VELOCITIES for q in parts} - set(kept):
         columns.pop(quantity, None)
     return columns, notes
 
 
-def _family(names: Collection[str]) -> str | None:
+def _writer_of_columns(names: Collection[str]) -> str | None:
     return next((who for who, marks in _FAMILIES if any(m <= {*names} for m in marks)), None)
 
 
-def _specs(names: list[str], altitude: Altitude | None) -> Mapping[str, ColumnSpec]:
-    """Return the columns that are looked for: with the altitude that is asked for, and another."""
+def _column_specs(names: list[str], altitude: Altitude | None) -> Mapping[str, ColumnSpec]:
+    """Return the columns to look for, with the given kind of altitude, or if none is given with a
+    second kind where there is one.
+    """
     specs = COLUMNS | {"alt": ColumnSpec(_ORDER[altitude], "m", required=True)}
     there = [name for name in _ORDER[altitude] if name in names]
     if altitude is None and len(there) > 1:

@@ -16,22 +16,22 @@ from components.formats.recording import Recording
 from components.formats.sample_columns import (
     ColumnSpec,
     SampleColumn,
-    complete_velocity,
-    indices_of,
+    column_indices,
+    convert_to_enu_velocity,
+    first_complete_velocity,
     unit_factor,
-    with_velocity,
 )
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
     ALL_TOKENS,
     Problems,
     TrafficFile,
-    cells,
     clean_token,
     did_you_mean,
     iterate_lines,
     read_content,
     shown_columns,
+    split_cells,
     text_of,
     tokens,
 )
@@ -95,13 +95,13 @@ def read_daa(
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
     reference = (reference_lat_deg, reference_lon_deg, reference_alt_m)
-    return record_daa(problems, iterate_lines(text), reference).flights()
+    return recording_of_daa(problems, iterate_lines(text), reference).flights()
 
 
-def record_daa(
+def recording_of_daa(
     problems: Problems, lines: Iterator[tuple[int, str]], reference: tuple[float, float, float]
 ) -> Recording:
-    """Return the aircraft of a `.daa` or `.xyz` file, see `read_daa`."""
+    """Return a `Recording` of the aircraft in a `.daa` or `.xyz` file."""
     table, columns = _table(problems, lines, ("yaw",))
     notes = table.notes.harmless
     if "sx" in columns:
@@ -111,7 +111,7 @@ def record_daa(
         )
     assumed = next((note for note in notes if note.startswith("there is no row of units")), "")
     return table.recording(
-        None, lambda samples: _geodetic(samples, reference), kind=DAIDALUS,
+        None, lambda samples: _to_geodetic(samples, reference), kind=DAIDALUS,
         units=assumed or "those of its row of units",
         height=columns["sz" if "sx" in columns else "alt"].header,
     )  # fmt: skip
@@ -128,7 +128,7 @@ def read_daa_samples(
     problems = Problems(str(path))
     text = text_of(read_content(Path(path), problems), problems)
     table, _ = _table(problems, iterate_lines(text), extra)
-    return {name: with_velocity(samples) for name, samples in table.samples(None).items()}
+    return {name: convert_to_enu_velocity(samples) for name, samples in table.samples(None).items()}
 
 
 def _table(
@@ -156,16 +156,16 @@ def _table(
     table = SampleTable(problems, headers, indices["name"], columns, optional=_OPTIONAL)
     table.notes.harmless[:0] = notes
     for number, text in body:
-        table.add_row(number, cells(text, len(headers), indices["name"]))
+        table.add_row(number, split_cells(text, len(headers), indices["name"]))
     return table, columns
 
 
 def _find_columns(
     problems: Problems, headers: list[str], line: int, extra: Sequence[str]
 ) -> dict[str, int]:
-    """Find which column holds what; a missing required one ends the reading."""
+    """Return each quantity's column index; TrafficFileError if a required one is missing."""
     plain = [header.lower() for header in headers]
-    indices = indices_of({**COLUMNS, **{q: EXTRA_COLUMNS[q] for q in extra}}, plain)
+    indices = column_indices({**COLUMNS, **{q: EXTRA_COLUMNS[q] for q in extra}}, plain)
     offsets = any(q in indices for q in ("sx", "sy", "sz")) and "lat" not in indices
     required = ("name", "time", *(("sx", "sy", "sz") if offsets else ("lat", "lon", "alt")))
     unused = [h for i, h in enumerate(plain) if i not in indices.values()]
@@ -186,7 +186,7 @@ def _find_columns(
 def _quantities_to_read(indices: dict[str, int]) -> list[str]:
     """List the quantities to read: time, position and one complete velocity."""
     wanted: list[str] = [q for q in ("time", "lat", "lon", "alt", "sx", "sy", "sz") if q in indices]
-    return [*wanted, *complete_velocity(indices)]
+    return [*wanted, *first_complete_velocity(indices)]
 
 
 def _find_units(
@@ -196,7 +196,7 @@ def _find_units(
     lines: Iterator[tuple[int, str]],
     notes: list[str],
 ) -> tuple[dict[str, tuple[int | None, str]], Iterator[tuple[int, str]]]:
-    """Read the row of units if there is one; returns (line, token) by quantity, and the rest."""
+    """Return quantities' units as (line, token), from the units' row or default, and other rows."""
     assumed = {q: spec.unit for q, spec in (COLUMNS | EXTRA_COLUMNS).items() if q != "name"}
     defaults: dict[str, tuple[int | None, str]] = {q: (None, u) for q, u in assumed.items()}
     line, text = next(lines, (0, ""))
@@ -220,11 +220,11 @@ def _find_units(
     return units, lines
 
 
-def _geodetic(
+def _to_geodetic(
     samples: dict[str, FloatArray], reference: tuple[float, float, float]
 ) -> dict[str, FloatArray]:
-    """Turn one aircraft's columns into geodetic positions and local velocities."""
-    samples = with_velocity(samples)
+    """Return an aircraft's columns with geodetic positions, and velocity, heading by local axes."""
+    samples = convert_to_enu_velocity(samples)
     if "sx" not in samples:
         return samples
     lat, lon, _ = enu_to_geodetic(
@@ -256,7 +256,7 @@ def _geodetic(
 def _rotate_to_axes(
     parts: Sequence[FloatArray], origin: Sequence[Vector], axes: Sequence[Vector]
 ) -> Any:
-    """Return a vector of east, north (and up) at an origin in the axes of other positions."""
+    """Return a vector of east, north (and up) at an origin by the axes of other positions."""
     by_axis = zip(*origin[: len(parts)], strict=True)
     xyz = [reduce(add, map(mul, parts, of_all)) for of_all in by_axis]
     return [reduce(add, map(mul, xyz, axis)) for axis in axes]

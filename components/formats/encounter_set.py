@@ -59,7 +59,7 @@ class EncounterSet:
         return len(self.numbers)
 
     def index_of(self, number: int) -> int:
-        """Return where an encounter stands."""
+        """Return the index of the encounter with this number; `NoSuchEncounter` if none."""
         at = int(np.searchsorted(self.numbers, number))
         if at < len(self) and self.numbers[at] == number:
             return at
@@ -70,10 +70,10 @@ class EncounterSet:
         )
 
     def take(self, indices: IntArray) -> "EncounterSet":
-        """Return the encounters of some indices, as often as each is given."""
+        """Return a set of the encounters at the indices, each as often as its index occurs."""
         counts, lengths = np.diff(self.first_rows), np.diff(self.starts)
-        rows = _runs(self.first_rows[indices], counts[indices])
-        entries = _runs(self.starts[rows], lengths[rows])
+        rows = _concatenated_ranges(self.first_rows[indices], counts[indices])
+        entries = _concatenated_ranges(self.starts[rows], lengths[rows])
         return replace(
             self,
             numbers=self.numbers[indices],
@@ -87,12 +87,14 @@ class EncounterSet:
         )
 
     def drop(self, indices: Sequence[int]) -> "EncounterSet":
-        """Return the set without some encounters, which are counted."""
+        """Return the set without the encounters at the indices; ``skipped`` counts them."""
         kept = self.take(np.delete(np.arange(len(self)), indices))
         return replace(kept, skipped=self.skipped + len(indices))
 
     def common_samples(self, index: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Yield the times (n,) and both positions (3, n) of samples shared with each intruder."""
+        """Yield for each intruder the times (n,) that both flights have in common, and both
+        positions (3, n) then: north, east, altitude (m).
+        """
         first, end = (int(self.first_rows[index + k]) for k in (0, 1))
         own = self.path(first)
         for row in range(first + 1, end):
@@ -110,16 +112,16 @@ class EncounterSet:
     ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Return time (s), north, east and altitude (m) along the path of one aircraft."""
         if self.kind == TRACKS:
-            lists = self._lists(row)
+            lists = self._list_values_of_row(row)
             return lists["time_s"], lists["north_m"], lists["east_m"], lists["altitude_m"]
         time_s, *position = fly_events([(self, row)], dynamics)
         return time_s, *(part[:, 0] for part in position)  # type: ignore[return-value]
 
     def seconds(self, row: int) -> int:
-        """Return how many whole seconds an aircraft of a set of events flies."""
+        """Return how long an aircraft of a set of events flies, rounded up to whole seconds."""
         return int(np.ceil(self.state["duration_s"][row]))
 
-    def _lists(self, row: int) -> dict[str, FloatArray]:
+    def _list_values_of_row(self, row: int) -> dict[str, FloatArray]:
         entries = slice(int(self.starts[row]), int(self.starts[row + 1]))
         return {name: values[entries] for name, values in self.lists.items()}
 
@@ -127,7 +129,7 @@ class EncounterSet:
 def fly_events(
     aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Fly initial states and events of several aircraft, as each would be flown alone.
+    """Fly several aircraft from their initial states by their events, each as if alone.
 
     All have as many `EncounterSet.seconds`; returns times (instants,) in s, and north, east and
     altitude (instants, aircraft) in m.
@@ -170,7 +172,7 @@ _PAIRS_AT_ONCE = 256
 def pair_paths(
     encounters: Sequence[tuple[EncounterSet, int]], dynamics: str
 ) -> Iterator[tuple[IntArray, PairPaths]]:
-    """Yield the paths of ownships and intruders in blocks of pairs, with encounter numbers.
+    """Yield blocks of ownship and intruder paths, with each pair's encounter index in sequence.
 
     Encounters are a set and an index there; of an encounter the intruders are in order.
     """
@@ -199,7 +201,7 @@ def pair_paths(
 def _count_begun_events(of: EncounterSet, rows: IntArray, seconds: int) -> IntArray:
     """Return how many events of each row have begun by each whole second, (seconds, rows)."""
     lengths = np.diff(of.starts)[rows]
-    time_s = of.lists["time_s"][_runs(of.starts[rows], lengths)]
+    time_s = of.lists["time_s"][_concatenated_ranges(of.starts[rows], lengths)]
     first = np.clip(np.ceil(time_s), 0.0, float(seconds)).astype(np.int64)
     column = np.repeat(np.arange(len(rows)), lengths)
     marks = np.bincount(first * len(rows) + column, minlength=(seconds + 1) * len(rows))
@@ -207,8 +209,8 @@ def _count_begun_events(of: EncounterSet, rows: IntArray, seconds: int) -> IntAr
     return begun
 
 
-def _runs(firsts: IntArray, lengths: IntArray) -> IntArray:
-    """Return first, first + 1, ... of every run, one run after the other."""
+def _concatenated_ranges(firsts: IntArray, lengths: IntArray) -> IntArray:
+    """Return the integers first, first + 1, ... of every range, one range after the other."""
     ends = np.cumsum(lengths)
     total = int(ends[-1]) if len(ends) else 0
     entries: IntArray = np.arange(total) + np.repeat(firsts - (ends - lengths), lengths)
@@ -223,7 +225,7 @@ GEOMETRIES = ("head-on", "overtaking", "crossing from the left", "crossing from 
 
 
 def geometry_class(course_deg: FloatArray) -> AnyArray:
-    """Return how each intruder's course lies to the ownship's.
+    """Return each intruder's encounter geometry name, by its course relative to the ownship's.
 
     Within 20° of opposite it is ``head-on``, within 70° of the same ``overtaking`` (either may be
     the one that overtakes), else ``crossing from the left`` (its course leads to the right) or

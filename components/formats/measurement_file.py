@@ -45,7 +45,7 @@ _FLAGS = {"true": 1.0, "false": 0.0, "1": 1.0, "0": 0.0}
 
 @dataclass(eq=False)
 class Measurements:
-    """Looks in the order of time, and what each detected: entries of all looks end to end.
+    """A sensor's looks in order of time, and what each detected: the joined entries of all.
 
     Entries ``offsets[i]:offsets[i + 1]`` belong to look i, NaN where a cell is empty; ``declared``
     and ``cued`` are 0 or 1. `looks` holds the ownship's pose and velocity, as far as the file says
@@ -81,7 +81,7 @@ class _Table:
             self.problems.add(f"row {self.line[row]}, column {column}: {what}")
 
     def take(self, rows: IntArray) -> None:
-        """Keep some rows."""
+        """Keep only the given rows of the table, in place."""
         self.numbers = {name: values[rows] for name, values in self.numbers.items()}
         self.texts = {n: [values[i] for i in rows.tolist()] for n, values in self.texts.items()}
         self.line = self.line[rows]
@@ -93,7 +93,7 @@ def read_measurements(
     place: tuple[float, float, float] | None = None,
     asterix: bytes | None = None,
 ) -> Measurements:
-    """Return the looks of a sensor; ValueError says all that is wrong, with its line or row.
+    """Read a sensor's looks from a file; ValueError lists all that is wrong, by line or row.
 
     The file is ``.parquet`` or CSV; the folder of a run, whose ``scans.parquet`` then says empty
     looks and the ownship's pose; or ASTERIX (``.ast``), whose angles are from north and level.
@@ -101,25 +101,25 @@ def read_measurements(
     is (degrees, m) that does not say it; `asterix` are its data blocks, of a file that holds more.
     """
     if path.suffix == ".ast" or asterix is not None:
-        return _of_asterix(path, block, place, asterix)
+        return _measurements_of_asterix(path, block, place, asterix)
     if not is_folder(path):
         table = _read_table(path, _NEEDED, block)
-        _check(table)
-        return _looks(table, None)
+        _check_values(table)
+        return _group_by_instant(table, None)
     scans = _read_table(path / "scans.parquet", ("time_s",), block)
     table = _read_table(path / "detections.parquet", _NEEDED, block)
-    _check(scans)
-    _check(table)
-    return _looks(table, scans)
+    _check_values(scans)
+    _check_values(table)
+    return _group_by_instant(table, scans)
 
 
-def _of_asterix(
+def _measurements_of_asterix(
     path: Path,
     radar: str | None,
     place: tuple[float, float, float] | None,
     asterix: bytes | None,
 ) -> Measurements:
-    """Return the plots of one radar, which stands level and looks north."""
+    """Return one ASTERIX radar's plots as measurements of a level sensor facing north."""
     from components.formats.asterix_file import read_asterix_plots
 
     problems, plots = Problems(str(path)), read_asterix_plots(path, place, asterix)
@@ -179,7 +179,7 @@ def _read_table(path: Path, needed: tuple[str, ...], block: str | None) -> _Tabl
             hint = did_you_mean(name, names)
             table.problems.add(f"there is no column {name!r} among {shown}{hint}")
     table.problems.raise_if_any()
-    _choose(table, block)
+    _keep_rows_of_block(table, block)
     return table
 
 
@@ -249,8 +249,8 @@ def _read_parquet_header(table: _Table) -> list[str]:
     return list(read.column_names)
 
 
-def _choose(table: _Table, block: str | None) -> None:
-    """Keep the rows of one sensor."""
+def _keep_rows_of_block(table: _Table, block: str | None) -> None:
+    """Keep one sensor's rows only, in place; an error if there are several and none is named."""
     if "block" not in table.texts:
         return
     known = dict.fromkeys(name for name in table.texts["block"] if name is not None)
@@ -265,8 +265,10 @@ def _choose(table: _Table, block: str | None) -> None:
     table.take(np.flatnonzero(wanted))
 
 
-def _check(table: _Table) -> None:
-    """Refuse values out of range, times that go back, and angles without each other."""
+def _check_values(table: _Table) -> None:
+    """Refuse values out of range, times that decrease, and one angle without the other; missing
+    arrival times become the time itself.
+    """
     numbers = table.numbers
     for name, values in numbers.items():
         low, high = LIMITS.get(name, (0.0, 1.0))
@@ -303,8 +305,8 @@ def _check(table: _Table) -> None:
         table.problems.fail("there are no rows")
 
 
-def _looks(table: _Table, scans: _Table | None) -> Measurements:
-    """Gather the rows of each instant; `scans` says the looks where it is given."""
+def _group_by_instant(table: _Table, scans: _Table | None) -> Measurements:
+    """Group each time's rows into a look; where ``scans`` is given, it says which there were."""
     of = table if scans is None else scans
     time_s, first = np.unique(of.numbers["time_s"], return_index=True)
     arrival_s = of.numbers.get("arrival_s", of.numbers["time_s"])[first]

@@ -19,8 +19,8 @@ from components.formats.set_file import EncounterSetError, read_set
 from components.formats.track_files import (
     Track,
     Tracks,
-    encounter_of,
     is_track_file,
+    name_tracks,
     read_paired_text,
     read_track_csv,
     read_track_matrices,
@@ -40,7 +40,7 @@ def set_of_tracks(
     reference_deg: tuple[float, float],
     skipped: int = 0,
 ) -> EncounterSet:
-    """Return a set of sampled tracks: for each encounter names and tracks, the ownship's first."""
+    """Return a set of sampled tracks, given by encounter as names with tracks, ownship first."""
     rows = [one for encounter in tracks for one in encounter]
     lists = {
         name: np.concatenate([track[k] for _, track in rows])
@@ -55,7 +55,9 @@ def set_of_tracks(
 
 
 def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int, str]]:
-    """Return the tracks of all encounters of a file of waypoints, and what is wrong with which."""
+    """Read a file of waypoints; returns the named tracks of each encounter, and by index what is
+    wrong with damaged encounters.
+    """
     try:
         content = read_input_bytes(path)
     except InputFileError as error:
@@ -147,7 +149,7 @@ def read_encounters(
     skip_damaged: bool,
     others: TrackReader | None = None,
 ) -> EncounterSet:
-    """Return what is in one set, in one file of waypoints, or in files of tracks.
+    """Read encounters from one set file, from one file of waypoints, or from files of tracks.
 
     Files of tracks are one encounter each; those of one aircraft each make an encounter two by two,
     the ownship's first. `others` reads files of recorded aircraft.
@@ -182,8 +184,8 @@ def read_encounters(
                 tracks, origin = [*alone[1][0], *tracks], alone[1][1]
                 alone = None
             elif alone is not None:
-                raise _one_aircraft(alone[0])
-            encounters.append(encounter_of(_shift_to_start(tracks)))
+                raise _single_aircraft_error(alone[0])
+            encounters.append(name_tracks(_shift_to_start(tracks)))
             numbers.append(number)
             if origin is not None:
                 origins.append(origin)
@@ -192,7 +194,7 @@ def read_encounters(
             alone = None
         number += 1
     if alone is not None:
-        wrong.append(str(_one_aircraft(alone[0])))
+        wrong.append(str(_single_aircraft_error(alone[0])))
     if wrong and (not skip_damaged or not encounters):
         raise EncounterSetError("\n".join(wrong[:_MOST_SAID]))
     where = at or (origins[0] if origins else (0.0, 0.0))
@@ -201,12 +203,12 @@ def read_encounters(
     return replace(found, notes=tuple(notes))
 
 
-def _one_aircraft(path: Path) -> EncounterSetError:
+def _single_aircraft_error(path: Path) -> EncounterSetError:
     return EncounterSetError(f"{path}: has one aircraft: an ownship and an intruder are needed")
 
 
 def _shift_to_start(tracks: list[Track]) -> list[Track]:
-    """Return the tracks of an encounter, times of a clock from its start."""
+    """Return tracks with times from the earliest if the times are dates, else unchanged."""
     start_s = min(float(track[0][0]) for track in tracks)
     if start_s < EPOCH_S:
         return tracks

@@ -27,8 +27,8 @@ _LASTS_S = 3.0
 Reports = Iterator[tuple[int, PositionReport]]
 
 
-def log_of(problems: Problems, data: bytes) -> Log | None:
-    """Return the log that some content is, or None where it is none that is known here."""
+def parse_receiver_log(problems: Problems, data: bytes) -> Log | None:
+    """Return the log in a receiver's file, or None if its format is not known here."""
     head = data[:3].lstrip(b"\xef\xbb\xbf") + data[3:4096]
     head = head.lstrip()
     callsigns: dict[str, str] = {}
@@ -60,7 +60,7 @@ UNKNOWN_JSON = (
 def json_documents(
     problems: Problems, data: bytes, warnings: list[str]
 ) -> Iterator[tuple[int, Any]]:
-    """Yield consecutive JSON documents and their offsets; of a list, its elements.
+    """Yield a file's JSON documents with their first line's number; lists element by element.
 
     A last line that is cut off, of a history that is being written, is left out with a warning.
     """
@@ -78,7 +78,7 @@ def json_documents(
                 yield from ((line, part) for part in parts)
                 at = parts.end
             else:
-                document, at = _decode(text, start)
+                document, at = _decode_document(text, start)
                 yield line, document
         except (ValueError, RecursionError) as error:
             end = text.find("\n", start)
@@ -98,7 +98,7 @@ _LONG = 2**20
 
 
 class _Parts:
-    """A list that begins at a place of a text; its parts are decoded each time they are asked for.
+    """The elements of a JSON list within a text, decoded anew in each iteration.
 
     So few are held at a time. `end` is where it ends, once all were given.
     """
@@ -120,7 +120,7 @@ class _Parts:
 
 
 def _skip_blanks(text: str, at: int) -> int:
-    """Return where something stands next; ValueError where nothing does."""
+    """Return the index of the next character that is not blank; ValueError if there is none."""
     if at < len(text) and not text[at].isspace():
         return at
     found = _BEGINS.search(text, at)
@@ -129,8 +129,8 @@ def _skip_blanks(text: str, at: int) -> int:
     return found.start()
 
 
-def _decode(text: str, start: int) -> tuple[Any, int]:
-    """Return the document that begins at a place, and where it ends."""
+def _decode_document(text: str, start: int) -> tuple[Any, int]:
+    """Return the JSON document that begins at an index of the text, and the index after it."""
     end = text.find("\n", start)
     if text[start] != "{" or (end if end >= 0 else len(text)) - start < _LONG:
         return _DECODER.raw_decode(text, start)
@@ -167,7 +167,7 @@ def _reports_of_documents(
     reader: _Reader,
     callsigns: dict[str, str],
 ) -> Reports:
-    """Return the reports of documents, without repetitions of the last position."""
+    """Yield JSON documents' position reports with lines, without repeated last positions."""
     last: dict[str, PositionReport] = {}
     for number, one in documents:
         if not isinstance(one, dict) or not marks <= one.keys():
@@ -175,7 +175,7 @@ def _reports_of_documents(
         try:
             for sample in reader(one, callsigns):
                 before = last.get(sample.name)
-                if before is None or not _is_again(sample, before):
+                if before is None or not _repeats_position(sample, before):
                     if _is_number(sample.geometric) or _is_number(sample.barometric):
                         last[sample.name] = sample
                     yield number, sample
@@ -193,14 +193,14 @@ def _is_number(value: Any) -> bool:
 _ROUNDED_S = 0.25
 
 
-def _is_again(sample: PositionReport, before: PositionReport) -> bool:
-    """Return whether two reports are of one position."""
+def _repeats_position(sample: PositionReport, before: PositionReport) -> bool:
+    """Return whether a report repeats the one before: the same position at nearly the same time."""
     return (sample.lat, sample.lon) == (before.lat, before.lon) and (
         sample.time == before.time or abs(sample.time - before.time) <= _ROUNDED_S
     )
 
 
-def _times(value: Any, factor: float) -> Any:
+def _scale_if_number(value: Any, factor: float) -> Any:
     return value * factor if isinstance(value, int | float) else value
 
 
@@ -219,9 +219,11 @@ def _read_aircraft_json(
         climb = craft.get("geom_rate", craft.get("baro_rate", craft.get("vert_rate")))
         yield PositionReport(
             name, _subtract_age(one["now"], craft.get("seen_pos", craft.get("seen"))),
-            craft.get("lat"), craft.get("lon"), _times(craft.get("alt_geom"), FOOT_M),
-            _times(craft.get("alt_baro", craft.get("altitude")), FOOT_M), craft.get("track"),
-            _times(craft.get("gs", craft.get("speed")), KNOT_M_S), _times(climb, _FPM),
+            craft.get("lat"), craft.get("lon"), _scale_if_number(craft.get("alt_geom"), FOOT_M),
+            _scale_if_number(craft.get("alt_baro", craft.get("altitude")), FOOT_M),
+            craft.get("track"),
+            _scale_if_number(craft.get("gs", craft.get("speed")), KNOT_M_S),
+            _scale_if_number(climb, _FPM),
         )  # fmt: skip
 
 
@@ -247,8 +249,9 @@ def _read_trace(one: Mapping[str, Any], callsigns: dict[str, str]) -> Iterator[P
         if isinstance(more, dict) and more.get("flight"):
             callsigns[name] = str(more["flight"]).strip()
         yield PositionReport(
-            name, one["timestamp"] + after_s, lat, lon, _times(geometric, FOOT_M),
-            _times(alt, FOOT_M), trk, _times(gs, KNOT_M_S), _times(climb, _FPM),
+            name, one["timestamp"] + after_s, lat, lon, _scale_if_number(geometric, FOOT_M),
+            _scale_if_number(alt, FOOT_M), trk, _scale_if_number(gs, KNOT_M_S),
+            _scale_if_number(climb, _FPM),
         )  # fmt: skip
 
 
@@ -287,8 +290,9 @@ def _read_flightradar24_feed(
             name = str(address or called)
             callsigns[name] = str(called)
             yield PositionReport(
-                name, time_s, lat, lon, None, None if ground else _times(alt, FOOT_M), trk,
-                _times(gs, KNOT_M_S), _times(climb, _FPM),
+                name, time_s, lat, lon, None, None if ground else _scale_if_number(alt, FOOT_M),
+                trk,
+                _scale_if_number(gs, KNOT_M_S), _scale_if_number(climb, _FPM),
             )  # fmt: skip
 
 
@@ -303,8 +307,9 @@ def _read_flightradar24_playback(
     for point in flight["track"]:
         yield PositionReport(
             name, point["timestamp"], point["latitude"], point["longitude"], None,
-            _times(point["altitude"]["feet"] or None, FOOT_M), point["heading"],
-            _times(point["speed"]["kts"], KNOT_M_S), _times(point["verticalSpeed"]["fpm"], _FPM),
+            _scale_if_number(point["altitude"]["feet"] or None, FOOT_M), point["heading"],
+            _scale_if_number(point["speed"]["kts"], KNOT_M_S),
+            _scale_if_number(point["verticalSpeed"]["fpm"], _FPM),
         )  # fmt: skip
 
 
@@ -318,7 +323,8 @@ def _read_flightradar24_details(
     for point in one["trail"]:
         yield PositionReport(
             name, point["ts"], point["lat"], point["lng"], None,
-            _times(point["alt"] or None, FOOT_M), point["hd"], _times(point["spd"], KNOT_M_S),
+            _scale_if_number(point["alt"] or None, FOOT_M), point["hd"],
+            _scale_if_number(point["spd"], KNOT_M_S),
         )  # fmt: skip
 
 
@@ -357,7 +363,7 @@ _JSON: tuple[tuple[frozenset[str], str, str, _Reader], ...] = (
 
 
 def _read_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Reports:
-    """Join the messages of each aircraft: positions with the last velocity, if it is recent."""
+    """Yield positions in BaseStation messages, with the aircraft's last velocity if recent."""
     moves: dict[str, tuple[float, tuple[Any, ...]]] = {}
     lines = iterate_lines(text_of(data, problems))
     del data
@@ -379,14 +385,17 @@ def _read_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Rep
             continue
         alt, gs, trk, lat, lon, climb = map(_number, cells[11:17])
         if gs is not None and trk is not None:
-            moves[name] = time_s, (trk, gs * KNOT_M_S, _times(climb, _FPM))
+            moves[name] = time_s, (trk, gs * KNOT_M_S, _scale_if_number(climb, _FPM))
         if lat is None or lon is None:
             continue
         at, move = moves.get(name, (-math.inf, ()))
         recent = move if abs(time_s - at) <= _LASTS_S else (None,) * 3
         if len(cells) > 21 and cells[21].strip() in ("-1", "1"):  # on the ground
             alt = None
-        yield number, PositionReport(name, time_s, lat, lon, None, _times(alt, FOOT_M), *recent)
+        yield (
+            number,
+            PositionReport(name, time_s, lat, lon, None, _scale_if_number(alt, FOOT_M), *recent),
+        )
 
 
 def _midnight(date: str) -> float | None:

@@ -26,7 +26,9 @@ Samples = dict[str, FloatArray]
 
 
 class ReadingNotes:
-    """What was assumed, reordered or left out: what is harmless, and what changes the flights."""
+    """Notes on what was assumed, reordered or left out in reading a file: harmless ones, and
+    warnings of what changes the flights.
+    """
 
     def __init__(self) -> None:
         self.harmless: list[str] = []
@@ -34,29 +36,29 @@ class ReadingNotes:
         self._of_aircraft: dict[tuple[str, bool], list[str]] = {}
 
     def note_aircraft(self, name: str, kind: str, text: str, *, harmless: bool = False) -> None:
-        """Add a note on one aircraft; of notes of one kind the first is kept, and their number."""
+        """Add a note on one aircraft; a kind's notes are reported as the first and a count."""
         cases = self._of_aircraft.setdefault((kind, harmless), [])
         if f"{name}: {text}" not in cases[-1:]:
             cases.append(f"{name}: {text}")
 
-    def settle(self) -> None:
-        """Append the notes on single aircraft to those that hold of all."""
+    def summarize_aircraft_notes(self) -> None:
+        """Append aircraft notes, summed up by kind, to the file's harmless notes or warnings."""
         for (_, harmless), cases in self._of_aircraft.items():
             more = f" (and {len(cases) - 1} more aircraft)" if len(cases) > 1 else ""
             (self.harmless if harmless else self.warnings).append(cases[0] + more)
         self._of_aircraft.clear()
 
     def add(self, other: ReadingNotes, file: str) -> None:
-        """Add those of another file, by its name."""
-        other.settle()
-        self.settle()
+        """Add the notes of another file, each behind that file's name."""
+        other.summarize_aircraft_notes()
+        self.summarize_aircraft_notes()
         self.harmless += [f"{file}: {text}" for text in other.harmless]
         self.warnings += [f"{file}: {text}" for text in other.warnings]
 
 
 @dataclass
 class Recording:
-    """The aircraft of a file, before they are flights.
+    """The aircraft of a file as columns of samples, before they become flights.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ class Recording:
     def flights(
         self, longest_gap_s: float | None = math.inf, start_s: float | None = None
     ) -> TrafficFile:
-        """Return the flights; the first aircraft is the ownship.
+        """Return the aircraft as flights, the first one as the ownship, and empty the recording.
 
         Their times count from `start_s`, by default from the earliest sample.
         Where samples are further apart than `longest_gap_s`, an aircraft is not there in between;
@@ -108,7 +110,7 @@ class Recording:
                     f"most {_FASTEST_MPS:g} m/s can be meant"
                 )
         self.problems.raise_if_any()
-        self.notes.settle()
+        self.notes.summarize_aircraft_notes()
         notes = [*self.notes.harmless, *self.notes.warnings]
         return TrafficFile(
             made[0], made[1:], start, notes, self.notes.warnings, None, self.kind, self.units,
@@ -159,7 +161,7 @@ class Recording:
 
 
 def subtract_start(time_s: FloatArray, start_s: float) -> FloatArray:
-    """Subtract the start, and with it the rounding that a large clock reading carries.
+    """Return times less the start, rounded so that large readings' rounding errors vanish.
 
     325374.3 - 325374.2 is 0.0999999999767 in doubles. The difference is rounded to the digits
     that the readings can hold (at most nanoseconds), so that a tenth of a second is the double
@@ -179,8 +181,10 @@ _FASTEST_AIRCRAFT_MPS, _SLACK_M = 1000.0, 5000.0
 _LEAST_SAMPLES = 3
 
 
-def aircraft_of(time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray) -> IntArray:
-    """Return which aircraft each sample of one name is of, numbered from 0 by their first samples.
+def aircraft_number_of_samples(
+    time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray
+) -> IntArray:
+    """Return each sample's aircraft number (names may be shared), from 0 by first samples.
 
     Samples are in the order of time. Each belongs to the aircraft whose last place is nearest if
     one could fly from there, else to another. Samples of none that has enough are the first one's.
@@ -222,7 +226,7 @@ WithLines = dict[str, tuple[IntArray, Samples]]
 
 
 def rename_duplicates(samples: WithLines, notes: ReadingNotes) -> WithLines:
-    """Return samples with names of their own for aircraft that share one, and note each such name.
+    """Return samples with a new name for each aircraft that shares one, and note each.
 
     The first keeps its name, others are numbered from 2: ``"X (2)"``.
     """
@@ -230,7 +234,9 @@ def rename_duplicates(samples: WithLines, notes: ReadingNotes) -> WithLines:
     for name, (lines, columns) in samples.items():
         order = np.argsort(columns["time"], kind="stable")
         of = np.empty(len(lines), dtype=np.int64)
-        of[order] = aircraft_of(*(columns[key][order] for key in ("time", "lat", "lon")))
+        of[order] = aircraft_number_of_samples(
+            *(columns[key][order] for key in ("time", "lat", "lon"))
+        )
         if not of.any():
             result[name] = lines, columns
             continue

@@ -4,13 +4,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from components.formats.recording import Recording
-from components.formats.sample_columns import Altitude, SampleColumn, with_velocity
+from components.formats.sample_columns import Altitude, SampleColumn, convert_to_enu_velocity
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import Problems
 
 
 class PositionReport(NamedTuple):
-    """One report: a number each, or what stands in its place; in SI units, degrees."""
+    """One position report in degrees and SI units; a field may hold None or text for no number."""
 
     name: str
     time: Any
@@ -27,7 +27,7 @@ class PositionReport(NamedTuple):
 
 
 class Log(NamedTuple):
-    """What a file of reports is: what it is called, its units, and its reports with their places.
+    """A file of position reports: its kind, its units, and its reports with their places in it.
 
     `callsigns` are known, by the names of aircraft, when the reports are read; `rows` is what its
     places count.
@@ -55,7 +55,7 @@ _PLACE = {name: place for place, name in enumerate(PositionReport._fields)}
 def build_recording(
     problems: Problems, log: Log, ownship: str | None = None, altitude: Altitude | None = None
 ) -> Recording:
-    """Return the aircraft of a log; the ownship is the first, or called by its name or callsign.
+    """Return a `Recording` of a log; the ownship is the first or that of the name or callsign.
 
     Heights are pressure altitudes, of an aircraft that reports none its geometric height; with
     `altitude`, those of that kind alone. Aircraft of one report are there at that instant only. All
@@ -87,5 +87,5 @@ def build_recording(
     named = [name for name, callsign in log.callsigns.items() if callsign == ownship]
     own = named[0] if len(named) == 1 else ownship
     return table.recording(
-        own, with_velocity, kind=log.kind, units=log.units, callsigns=log.callsigns
+        own, convert_to_enu_velocity, kind=log.kind, units=log.units, callsigns=log.callsigns
     )

@@ -42,14 +42,14 @@ class ColumnSpec:
         return next(kind for kind in UNIT_KINDS if self.unit in kind)
 
 
-def indices_of(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
-    """Return the column index of each quantity that a file has."""
+def column_indices(columns: Mapping[str, ColumnSpec], names: Sequence[str]) -> dict[str, int]:
+    """Return the index of the column of each quantity that is among the names."""
     name_of = {q: next((n for n in spec.names if n in names), None) for q, spec in columns.items()}
     return {quantity: names.index(name) for quantity, name in name_of.items() if name is not None}
 
 
-def complete_velocity(there: Collection[str]) -> tuple[str, ...]:
-    """Return the quantities of the first velocity that is complete: half of one is no use."""
+def first_complete_velocity(there: Collection[str]) -> tuple[str, ...]:
+    """Return the quantities of the first complete kind of velocity, or an empty tuple."""
     return next((parts for parts in VELOCITIES if all(q in there for q in parts)), ())
 
 
@@ -90,8 +90,8 @@ def is_missing(cell: str) -> bool:
     return cell.strip().lower() in _MISSING
 
 
-def with_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
-    """Return columns with east, north, up velocity in place of vx vy vz or trk gs vs."""
+def convert_to_enu_velocity(columns: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return columns with velocity east, north, up (ve, vn, vu) for vx vy vz or trk gs vs."""
     kinds = [[columns.pop(part, None) for part in parts] for parts in VELOCITIES]
     for kind, (first, second, third) in enumerate(kinds):
         if first is not None and second is not None and third is not None:
@@ -125,7 +125,7 @@ def name_and_unit(header: str) -> tuple[str, str | None]:
 def resolve_epoch_unit(
     column: SampleColumn, cell: str, header: str, notes: list[str]
 ) -> SampleColumn:
-    """Return the column of time in the unit that its first number must be in."""
+    """Return the time column with its header's unit, else that implied by its first number."""
     if name_and_unit(header)[1] is not None or not re.fullmatch(r"\d{12,19}(\.\d*)?", cell):
         return column
     unit = next(unit for least, unit in _EPOCHS if float(cell) >= least)
@@ -134,7 +134,7 @@ def resolve_epoch_unit(
 
 
 def time_parser(column: SampleColumn) -> Callable[[str], float]:
-    """Make a function that reads a number in the column's unit, an ISO 8601 instant or a clock.
+    """Return a function that reads cells as seconds: in the column's unit, ISO 8601, clock time.
 
     Clocks that go on soon after midnight are of the next day.
     """
@@ -174,7 +174,7 @@ _OF_A_SECOND = {"lat": 0.0008, "lon": 0.0008, "alt": 50.0}
 
 
 class GrowingColumns:
-    """The samples of one aircraft as they come; a column begins with its first number."""
+    """The samples of one aircraft as they are read; a column is created at its first number."""
 
     def __init__(self, quantities: Collection[str]) -> None:
         self.lines = array("I")
@@ -183,7 +183,7 @@ class GrowingColumns:
         self._appends: list[tuple[int, Callable[[float], None]]] = []
 
     def add(self, line: int, numbers: Sequence[float]) -> None:
-        """Add a sample of numbers in the order of the quantities, NaN where there is none."""
+        """Add a sample by its line and a number for each quantity, NaN where there is none."""
         for k, quantity in [one for one in self._unseen if numbers[one[0]] == numbers[one[0]]]:
             self._unseen.remove((k, quantity))
             column = self.values[quantity] = array("d", [math.nan]) * len(self.lines)
@@ -193,21 +193,21 @@ class GrowingColumns:
             append(numbers[k])
 
 
-def number_of(value: Any) -> float:
-    """Return a number; NaN for what is none, ``"ground"`` for an altitude say."""
+def int_as_float(value: Any) -> float:
+    """Return an int as float, NaN for anything else, such as ``None`` or the text ``ground``."""
     if isinstance(value, bool) or not isinstance(value, int) or abs(value) > 2**62:
         return math.nan
     return float(value)
 
 
-def take_rows(columns: dict[str, FloatArray], rows: Any) -> None:
-    """Keep some rows of columns, one column after the other: two are there twice at no time."""
+def keep_rows(columns: dict[str, FloatArray], rows: Any) -> None:
+    """Keep only the given rows of each column, in place, column by column to save memory."""
     for key in columns:
         columns[key] = columns[key][rows]
 
 
-def are_of_one_second(columns: dict[str, FloatArray], at_once: Any) -> bool:
-    """Return whether samples of one instant are close together, as a coarse clock makes them."""
+def may_be_of_one_second(columns: dict[str, FloatArray], at_once: Any) -> bool:
+    """Return whether samples of equal times are so close that a clock of seconds may be why."""
     return columns.keys() >= _OF_A_SECOND.keys() and all(
         bool((np.abs(np.diff(columns[key])[at_once]) <= most).all())
         for key, most in _OF_A_SECOND.items()
@@ -215,7 +215,7 @@ def are_of_one_second(columns: dict[str, FloatArray], at_once: Any) -> bool:
 
 
 def fill_gaps(times: FloatArray, values: FloatArray) -> FloatArray | None:
-    """Return values with those of the nearest sample in a few gaps; None where they are more."""
+    """Return values with gaps (NaN) filled from the nearest sample; None if too many or long."""
     order = np.argsort(times, kind="stable")
     known = order[~np.isnan(values[order])]
     gaps = np.flatnonzero(np.isnan(values))

@@ -16,11 +16,11 @@ from components.formats.sample_columns import (
     ONE_IN,
     GrowingColumns,
     SampleColumn,
-    are_of_one_second,
     fill_gaps,
+    int_as_float,
     is_missing,
-    number_of,
-    take_rows,
+    keep_rows,
+    may_be_of_one_second,
 )
 from components.formats.text_rows import MOST_OF_A_CELL, MOST_PROBLEMS, Problems, TrafficFile
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -105,7 +105,7 @@ class SampleTable:
             self.notes.harmless.append(f"columns ignored: {', '.join(ignored)}")
 
     def add_row(self, line: int, row: list[str] | int) -> None:
-        """Add a sample, or note what is wrong; a row may be the number of its cells alone."""
+        """Add a row of cells as a sample, or a problem; an int stands for a wrong cell count."""
         if isinstance(row, int) or len(row) != self._width:
             count = row if isinstance(row, int) else len(row)
             self._problems.add(
@@ -134,14 +134,14 @@ class SampleTable:
             rows.add(line, numbers)
 
     def add_numbers(self, line: int, name: str, values: Sequence[Any]) -> None:
-        """Add a sample of values in the order of the columns, of which some are no numbers."""
+        """Add a sample of values in the columns' order; what is no number counts as missing."""
         rows = self._rows_of(name)
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
         numbers: list[float] = []
         for (quantity, _, _, low, high), value in zip(self._plan, values, strict=True):
-            number = value if type(value) is float else number_of(value)
+            number = value if type(value) is float else int_as_float(value)
             if not low <= number <= high:
                 if quantity not in self._optional and math.isfinite(number):
                     self._number(line, quantity, self._columns[quantity], repr(number))
@@ -156,7 +156,9 @@ class SampleTable:
         return self._aircraft[name]
 
     def _read_unusual_cell(self, line: int, quantity: str, cell: str) -> float | None:
-        """Return what a cell means that is no plain number: NaN for none, None for a problem."""
+        """Return the value of a cell that is no plain number within its limits: NaN for a missing
+        one, None after adding a problem.
+        """
         if quantity in self._optional:
             return math.nan
         if self._gaps and is_missing(cell):
@@ -164,7 +166,7 @@ class SampleTable:
         return self._number(line, quantity, self._columns[quantity], cell)
 
     def _describe_columns(self, key: str) -> str:
-        """Return the column that a quantity is of, or the two."""
+        """Return in words which column, or which two, a quantity was read from."""
         first, second = (self._columns.get(one) for one in (key, self._instead.get(key, "")))
         whom = len(self._second.get(key, ()))
         if first is None or second is None or not whom:
@@ -173,8 +175,8 @@ class SampleTable:
             return second.header
         return f"{first.header}, of {whom} aircraft {second.header}"
 
-    def _above_sea(self, names: Collection[str]) -> list[str]:
-        """Return which aircraft's heights are above mean sea level, as their column's name says."""
+    def _aircraft_above_sea(self, names: Collection[str]) -> list[str]:
+        """Return the aircraft whose heights are above mean sea level by their column's header."""
         second = self._second.get("alt", ())
         columns = [self._columns.get("alt instead" if name in second else "alt") for name in names]
         return [
@@ -183,21 +185,21 @@ class SampleTable:
         ]  # fmt: skip
 
     def recording(self, ownship: str | None, to_geodetic: Converter, **said: Any) -> Recording:
-        """Check each aircraft's samples and return them; `said` is what `Recording` says of it."""
+        """Check the samples and return a `Recording`, with ``said`` as its further fields."""
         samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
         said = {
             "height": self._describe_columns("alt"),
-            "above_sea": self._above_sea(samples),
+            "above_sea": self._aircraft_above_sea(samples),
             **said,
         }
         return Recording(self._problems, samples, self.notes, **said)
 
     def finish(self, ownship: str | None, to_geodetic: Converter) -> TrafficFile:
-        """Check each aircraft's samples and make the trajectories."""
+        """Check the samples and return them as the flights of a `TrafficFile`."""
         return self.recording(ownship, to_geodetic).flights()
 
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
-        """Check each aircraft's samples and return them as columns, in the order of time."""
+        """Check the samples; return their columns by aircraft, ownship first, in time order."""
         kept = self._drop_gaps()
         if self._shared:
             kept = rename_duplicates(kept, self.notes)
@@ -226,7 +228,7 @@ class SampleTable:
         return {own: samples.pop(own), **samples}
 
     def _drop_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
-        """Return the lines and columns of each aircraft; rows and columns with gaps are gone."""
+        """Return each aircraft's line numbers and columns, without rows and columns with gaps."""
         kept = {}
         self._lacks: dict[str, int] = {}
         left_out, absent = 0, 0
@@ -260,7 +262,7 @@ class SampleTable:
             if not there.all():
                 left_out += int(np.count_nonzero(~there))
                 lines = lines[there]
-                take_rows(columns, there)
+                keep_rows(columns, there)
                 if not len(lines):
                     absent += 1
                     continue
@@ -295,14 +297,14 @@ class SampleTable:
         return kept
 
     def _describe_missing_quantities(self, between: str) -> str:
-        """Return what rows lacked that were left out."""
+        """Return in words which quantities were missing in the rows that were left out."""
         kinds = ("time", "position", "height")
         return between.join(f"no {kind}" for kind in kinds if kind in self._lacks)
 
     def _first_or_second(
         self, name: str, key: str, first: FloatArray | None, second: FloatArray | None
     ) -> FloatArray | None:
-        """Return an aircraft's first column, or its second where it has nothing in the first."""
+        """Return an aircraft's first column of a quantity, else its second; note any difference."""
         if first is not None and second is not None:
             apart = np.abs(first - second)
             if not np.isnan(apart).all():
@@ -370,7 +372,7 @@ class SampleTable:
     def _sort_by_time(
         self, name: str, lines: IntArray, columns: dict[str, FloatArray]
     ) -> dict[str, FloatArray]:
-        """Return an aircraft's samples by time; add a problem for two places at one time."""
+        """Return samples in order of time, each once; a problem if two positions at one time."""
         if not len(lines):
             return {}
         if np.any(columns["time"][1:] < columns["time"][:-1]):
@@ -382,7 +384,7 @@ class SampleTable:
                 harmless=True,
             )
             lines = lines[order]
-            take_rows(columns, order)
+            keep_rows(columns, order)
         apart = self._optional | ({"alt"} if self._repeats else frozenset())
         where = [values for key, values in columns.items() if key not in apart]
         again = np.all([values[1:] == values[:-1] for values in where], axis=0) & self._gaps
@@ -392,15 +394,15 @@ class SampleTable:
             self.notes.note_aircraft(name, "again", said, harmless=self._repeats)
             once = np.concatenate([[True], ~again])
             lines = lines[once]
-            take_rows(columns, once)
+            keep_rows(columns, once)
         times, header = columns["time"], self._columns["time"].header
         at_once = np.diff(times) < _SHORTEST_STEP_S
         count = int(np.count_nonzero(at_once))
-        is_slip = count <= len(times) // ONE_IN or are_of_one_second(columns, at_once)
+        is_slip = count <= len(times) // ONE_IN or may_be_of_one_second(columns, at_once)
         if self._gaps and count and is_slip:
             said = f"several samples at one instant, {count} times: the last one counts"
             self.notes.note_aircraft(name, "at once", said)
-            take_rows(columns, np.append(~at_once, True))
+            keep_rows(columns, np.append(~at_once, True))
             return columns
         for i in np.flatnonzero(at_once):
             of = f"{self._problems.of} {lines[i]}"
@@ -415,7 +417,7 @@ class SampleTable:
     def _refuse_long_silence(
         self, kept: Mapping[str, tuple[IntArray, dict[str, FloatArray]]]
     ) -> None:
-        """Add a problem for each time after which the whole file has no samples for too long."""
+        """Add a problem for each gap in the times of the whole file that is too long."""
         times = np.concatenate([columns["time"] for _, columns in kept.values()])
         times.sort()
         for i in np.flatnonzero(np.diff(times) > _LONGEST_SILENCE_S):

@@ -23,9 +23,9 @@ from components.formats.encounter_set import (
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.errors import OutputError, did_you_mean, shown_value
-from dsa_des.files.input_files import InputFileError, cache_reads, readable_file_status
+from dsa_des.files.input_files import InputFileError, cache_file_reads, readable_file_status
 from dsa_des.files.output_file import stream_file
-from dsa_des.files.output_names import reason_of
+from dsa_des.files.output_names import system_error_text
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -61,7 +61,7 @@ class EncounterSetError(ValueError):
     """A set cannot be used; each line of the message names the file, and the encounter if one."""
 
 
-@cache_reads(4)
+@cache_file_reads(4)
 def read_set(path: Path, skip_damaged: bool = False) -> EncounterSet:
     """Read a set of encounters."""
     import pyarrow as pa
@@ -149,7 +149,7 @@ class _SetReader:
             raise self.fail(f"column {name!r}: holds {column.type}; numbers are needed") from None
 
     def flat_lists(self) -> tuple[IntArray, dict[str, FloatArray], dict[int, str]]:
-        """Return where the lists of each row begin, all of them end to end, and bad rows."""
+        """Return where rows' lists begin, the lists joined by column, and by row what is wrong."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -194,7 +194,7 @@ class _SetReader:
         weights: FloatArray,
         names: list[Any],
     ) -> dict[int, str]:
-        """Return row → the first thing that is wrong with it."""
+        """Return by row the first thing that is wrong with it; faultless rows are left out."""
         problems: dict[int, str] = {}
         row_of = np.repeat(np.arange(len(starts) - 1), np.diff(starts))
 
@@ -262,7 +262,7 @@ class _SetReader:
 
 
 def write_set(path: Path, about: dict[str, Any], parts: Iterable[EncounterSet]) -> None:
-    """Write a set part by part, each with numbers that follow those before, wholly or not at all.
+    """Write encounters part by part, numbers ascending throughout, completely or not at all.
 
     OutputError says why it cannot be written.
     """
@@ -279,7 +279,7 @@ def write_set(path: Path, about: dict[str, Any], parts: Iterable[EncounterSet]) 
                     writer = stack.enter_context(pq.ParquetWriter(file, schema))
                 writer.write_table(table.replace_schema_metadata(writer.schema.metadata))
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written: {reason_of(error)}") from error
+        raise OutputError(f"{path}: cannot be written: {system_error_text(error)}") from error
 
 
 def _table_of(some: EncounterSet) -> "pa.Table":

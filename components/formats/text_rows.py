@@ -27,7 +27,7 @@ from dsa_des.text.safe_text import shorten
 
 
 def _factors_by_name(*units: tuple[str, float]) -> dict[str, float]:
-    """Return what units are worth by each of their names."""
+    """Return the factor of each unit by each of the names that it may have."""
     return {name: worth for names, worth in units for name in names.split()}
 
 
@@ -86,7 +86,7 @@ class TrafficFileError(ValueError):
 
 @dataclass(frozen=True)
 class TrafficFile:
-    """The aircraft of a file: the ownship, and all others in the order in which it names them.
+    """The aircraft of a file as flights: the ownship, and all others in the order of the file.
 
     Times count from the file's earliest sample, `start_time_s` of its own; `notes` says what was
     assumed, reordered or ignored, `warnings` those of them that change what is flown.
@@ -150,7 +150,7 @@ class Problems:
 
 
 def shown_columns(headers: Iterable[str], known: bool) -> str:
-    """Return the names of columns for a message; `known` says whether any is one of ours.
+    """Return column names as text for a message, or only their number if none is known.
 
     A file without any of our columns is something else, whose content is not quoted.
     """
@@ -259,8 +259,8 @@ def tokens(line: str) -> list[str]:
     return _TOKEN.findall(line)
 
 
-def cells(line: str, count: int, name_column: int) -> list[str] | int:
-    """Split a row of values into as many cells as there are columns, or say how many it has.
+def split_cells(line: str, count: int, name_column: int) -> list[str] | int:
+    """Split a row into as many cells as columns, or return its number of cells if not possible.
 
     Commas (or semicolons, or tabs where there are neither) separate first; a cell that holds
     blanks is split further until the count fits, the aircraft's name last of all, so that names
@@ -291,7 +291,7 @@ _FRAME, _HEAD = re.compile(r"[+|]?-[-+]+-[+|]?"), 30
 
 
 def strip_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Yield the rows of a table framed by a shell (Impala, Trino), its header once."""
+    """Yield a table's rows without a database shell's frame (Impala, Trino), its header once."""
     head = list(islice(lines, _HEAD))
     names = ""
     if not any(_FRAME.fullmatch(text) for _, text in head):
@@ -306,7 +306,7 @@ def strip_frame(lines: Iterator[tuple[int, str]]) -> Iterator[tuple[int, str]]:
 def quoted_rows(
     lines: Iterator[tuple[int, str]], delimiter: str
 ) -> Iterator[tuple[int, list[str]]]:
-    """Return each row's cells and the line where it begins; a quoted cell may go over several."""
+    """Yield each row's first line number and its cells; a quoted cell may span lines."""
     if delimiter == " ":
         yield from ((number, text.split()) for number, text in lines)
         return

@@ -57,7 +57,7 @@ def _table(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
 
 
 def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
-    """Return time and position of a row, the time first."""
+    """Return a row's cells as finite numbers, time first; EncounterSetError if not, or time < 0."""
     try:
         values = [float(cell) for cell in cells]
     except ValueError:
@@ -70,7 +70,7 @@ def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
 
 
 def is_track_file(path: Path) -> bool:
-    """Return whether a file has one of these formats, or may have."""
+    """Return whether a file is a track file of these formats, also if it cannot be read."""
     if path.suffix.lower() == ".mat":
         return True
     try:
@@ -105,13 +105,15 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
     notes: list[str] = []
     tracks = [_sort_by_time(path, n, np.array(rows).T, notes) for n, rows in rows_of.items()]
     if wanted is _PLANE:
-        return [_feet(t, x, y, z) for t, x, y, z in tracks], None, notes
+        return [_track_from_feet(t, x, y, z) for t, x, y, z in tracks], None, notes
     origin = at or (float(tracks[0][1, 0]), float(tracks[0][2, 0]))
     return [_project_to_plane(samples, origin) for samples in tracks], origin, notes
 
 
 def _project_to_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
-    """Return a track of latitudes and longitudes in the plane that touches at the origin."""
+    """Return a track given by latitude, longitude and height (ft) as north, east and height (m) in
+    the plane that touches at the origin.
+    """
     time_s, lat, lon, alt_ft = samples
     north, east, _ = line_of_sight_ned(*origin, 0.0, lat, lon, np.zeros_like(lat))
     return time_s, north, east, alt_ft * FOOT_M
@@ -209,12 +211,16 @@ def read_track_matrices(path: Path) -> Tracks:
             raise EncounterSetError(f"{path}: aircraft {k + 1}: holds something else than numbers")
         if matrix[0, 0] < 0.0:
             raise EncounterSetError(f"{path}: aircraft {k + 1}: time is negative")
-        tracks.append(_feet(*_sort_by_time(path, f"aircraft {k + 1}", matrix[:4], notes)))
+        tracks.append(
+            _track_from_feet(*_sort_by_time(path, f"aircraft {k + 1}", matrix[:4], notes))
+        )
     return tracks, None, notes
 
 
 def _sort_by_time(path: Path, name: str, samples: FloatArray, notes: list[str]) -> FloatArray:
-    """Return samples (columns, n), the time first, by time; those that stand there again once."""
+    """Return samples (columns, n) in order of time, each once; two positions at one time raise
+    EncounterSetError.
+    """
     name = name or "the track"
     order = np.argsort(samples[0], kind="stable")
     if (order[1:] < order[:-1]).any():
@@ -232,12 +238,14 @@ def _sort_by_time(path: Path, name: str, samples: FloatArray, notes: list[str]) 
     return samples
 
 
-def _feet(time_s: FloatArray, north: FloatArray, east: FloatArray, up: FloatArray) -> Track:
+def _track_from_feet(
+    time_s: FloatArray, north: FloatArray, east: FloatArray, up: FloatArray
+) -> Track:
     return time_s, north * FOOT_M, east * FOOT_M, up * FOOT_M
 
 
-def encounter_of(tracks: list[Track]) -> list[tuple[str, Track]]:
-    """Return tracks with names: the first is the ownship's."""
+def name_tracks(tracks: list[Track]) -> list[tuple[str, Track]]:
+    """Return the tracks with names, the first as the ownship and the others as intruders."""
     names = [*NAMES, *(f"intruder {k}" for k in range(2, len(tracks)))]
     return list(zip(names, tracks, strict=False))
 

@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.recent import Recent, split_used_rows
+from components.fusion.recent_detections import Recent, split_used_rows
 from components.messages.columns import OWN_VELOCITY, POSE, TOLD
 from components.messages.contributors import mask_type
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
-from components.navigation.errors import navigation_errs
-from components.sensor.marks import FUSION
+from components.navigation.errors import has_navigation_errors
+from components.sensor.palette import FUSION
 from dsa_des.arrays.run_ticks import RunTicks, rank_instants, take_runs
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Producer
 from dsa_des.block.ladder import Verified
-from dsa_des.block.message import Message, offsets_of
+from dsa_des.block.message import Message, offsets_from_entry_rows
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.failure_counts import Tries, has_two_bits
 
@@ -33,7 +33,7 @@ _RATES = ("range_rate_m_s", "range_rate_variance_m2_s2")
 
 
 class Fusion(Component):
-    """Puts detections together; subclasses say which belong together.
+    """Combines several sensors' detections; subclasses decide which belong together.
 
     Range comes from a sensor that measures it, angles from one that does not (an optical one)
     where there is one; among equals the finest angular resolution wins, then the name. What is
@@ -86,14 +86,14 @@ class Fusion(Component):
         self.keep_ticks = self.gate_ticks
         self._recent = Recent()
         self._tries = Tries()
-        self._navigation_errs = navigation_errs(self.context)
+        self._navigation_errs = has_navigation_errors(self.context)
         tracked = any(consumer.request != WITHOUT_POSE for consumer in self.context.consumers)
         self._with_pose = self._navigation_errs or tracked
         self._says_what_is_new = tracked and self.puts_together and len(offers) > 1
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: where navigation errs, with the believed pose."""
-        return [FusedWithPose] if navigation_errs(self.context) else [*super().records()]
+        """Return the recorded message types, with the believed pose if navigation has errors."""
+        return [FusedWithPose] if has_navigation_errors(self.context) else [*super().records()]
 
     def offer(self, port: str) -> Any:
         """Return the sensors' declarations by name, with the latency of each."""
@@ -112,7 +112,7 @@ class Fusion(Component):
         }
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return the runs in which it never fused detections of two sensors."""
+        """Return in which runs several sensors detected but no detections were ever combined."""
         if not self.puts_together:
             return {}
         return self._tries.failure_counts(
@@ -124,7 +124,7 @@ class Fusion(Component):
         raise TypeError(f"{type(self).__name__} states no window")
 
     def merge_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
-        """Return new and recent rows of every sensor, and keep what the next run may need."""
+        """Return every sensor's new and recent rows; store those later rows may combine with."""
         together, self._recent = self._recent.add_arrivals(
             arrivals, wake.first_run, self.keep_ticks
         )
@@ -138,7 +138,7 @@ class Fusion(Component):
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> FusedDetections:
-        """Build the fused rows of some instants from the best of what belongs together.
+        """Build the instants' fused rows, each from the best values that belong together.
 
         Parameters
         ----------
@@ -158,10 +158,10 @@ class Fusion(Component):
             run, of_two = take_runs(instants.run, row), has_two_bits(fused.contributors)
             self._tries = self._tries.add_tries(run, fused.contributors, of_two)
         if self._says_what_is_new:
-            fused.measurements = self._new(fused, parts, instants, arrivals, entries)
+            fused.measurements = self._new_measurements(fused, parts, instants, arrivals, entries)
         return fused
 
-    def _new(
+    def _new_measurements(
         self,
         fused: FusedDetections,
         parts: IntArray,
@@ -169,10 +169,10 @@ class Fusion(Component):
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> FusedDetections:
-        """Return what a tracker takes of fused rows: what is new, and of one instant."""
+        """Return fused detections for a tracker: of unused detections only, of one instant each."""
         made = np.concatenate([one.message.measured_ticks() for one in arrivals.values()])
         targets = np.concatenate([one.message.target for one in arrivals.values()])
-        used = self._recent.find_used(arrivals)
+        used = self._recent.used_mask(arrivals)
         row = fused.row_of_entries
         whole, at, alone = split_used_rows(row, parts, made, used)
         used[parts[parts >= 0]] = True
@@ -196,7 +196,8 @@ class Fusion(Component):
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> tuple[FusedDetections, IntArray]:
-        """Return fused rows, and the detections (quantities, fused) that each takes values of.
+        """Return the fused rows, and the indices (quantities, fused) of the detections from which
+        each fused detection takes its values.
 
         These are numbered over the arrivals, one after the other; -1 is none.
         """
@@ -204,8 +205,8 @@ class Fusion(Component):
         contributors: Any = np.zeros(len(row), dtype=mask_type(len(self.sensors)))
         for index, (rows, _) in every.found.items():
             contributors[rows] |= 1 << index
-        angle_source, of_angles = every.best(self.by_angles)
-        range_source, of_range = every.best(self.by_range)
+        angle_source, of_angles = every.best_sources(self.by_angles)
+        range_source, of_range = every.best_sources(self.by_range)
         parts = [of_angles, of_range]
         values = {name: every.values_at(attrgetter(name), of_angles) for name in _ANGLES}
         values |= {name: every.values_at(attrgetter(name), of_range) for name in _RANGES}
@@ -213,7 +214,7 @@ class Fusion(Component):
         told = every.values_at(reported_error_columns, of_range) if self._told else None
         moves = None
         if self.by_range_rate:
-            _, of_rate = every.best(self.by_range_rate)
+            _, of_rate = every.best_sources(self.by_range_rate)
             parts.append(of_rate)
             values |= {name: every.values_at(attrgetter(name), of_rate) for name in _RATES}
             moves = every.values_at(velocities, of_rate) if self._with_pose else None
@@ -221,7 +222,7 @@ class Fusion(Component):
         fused = message(
             tick=instants.tick,
             run=instants.run,
-            offsets=offsets_of(row, len(instants)),
+            offsets=offsets_from_entry_rows(row, len(instants)),
             target=target,
             contributors=contributors,
             angle_source=angle_source,
@@ -241,7 +242,7 @@ class Fusion(Component):
 
 
 def largest_delay_s(sensor: Producer) -> Fraction:
-    """Return the largest delay of a sensor's looks: its own latency, and the wire's."""
+    """Return a sensor's largest delay (s): its own latency, and that on the way to here."""
     own_s = sensor.offer.latest_s if isinstance(sensor.offer, SensorOffer) else None
     return sensor.latest_s + (own_s or Fraction(0))
 
@@ -256,21 +257,21 @@ def poses(message: Detections) -> FloatArray:
 
 def velocities(message: Detections) -> FloatArray:
     """Return the ownship's velocity at each entry, (3, entries); NaN where none is stated."""
-    velocity = message.velocity_columns()
+    velocity = message.own_velocity_columns()
     if velocity is None:
         return np.full((len(OWN_VELOCITY), len(message.target)), np.nan)
     return np.stack(list(velocity.values()))
 
 
 def reported_error_columns(message: Detections) -> FloatArray:
-    """Return the reported error columns of each entry, (`TOLD`, entries); NaN where none."""
+    """Return targets' reported errors for each entry, (`TOLD`, entries); NaN where none."""
     if message.told_by_target is None:
         return np.full((len(TOLD), len(message.target)), np.nan)
     return np.stack([message.told_by_target[name] for name in TOLD])
 
 
 class _Entries:
-    """The entries of all sensors, one after the other, and which of them fused rows may take."""
+    """All sensors' entries, joined, and those each fused row may take its values from."""
 
     def __init__(
         self, sensors: Sequence[str], arrivals: dict[str, Arrivals], entries: dict[str, IntArray]
@@ -287,8 +288,9 @@ class _Entries:
             start += len(new.message.target)
         self._entries = start
 
-    def best(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
-        """Return the sensor and the entry that each row takes, -1 for none; the last one counts.
+    def best_sources(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
+        """Return for each row the sensor and the entry that it takes values from, -1 for none; a
+        later sensor in ``ranked`` wins.
 
         The entries are None where they are those of the only message, one after the other.
         """
@@ -305,7 +307,7 @@ class _Entries:
         return sensor, entry
 
     def values_at(self, of: Callable[[Detections], AnyArray], entry: IntArray | None) -> Any:
-        """Return what rows take of a message's entries, (..., rows); NaN or 0 for none."""
+        """Return a column at each row's entry, shape (..., rows); NaN or 0 where it has none."""
         if entry is None:
             return of(self._messages[0])
         parts = [of(message) for message in self._messages]
@@ -317,7 +319,7 @@ class _Entries:
 def latest_in_gate(
     arrivals: Arrivals, asked: RunTicks, targets: IntArray, gate_ticks: int
 ) -> IntArray:
-    """Return the latest entry that arrived at the instant or at most `gate_ticks` before it.
+    """Return by instant and target its latest entry that arrived at most ``gate_ticks`` before.
 
     `asked` (fused,) are instants and `targets` (fused,) whose entries are wanted; -1 where a sensor
     has none.
@@ -345,7 +347,7 @@ def latest_in_gate(
 def single_entry_rows(
     taken: Mapping[str, tuple[IntArray, IntArray]], sensors: Iterable[str]
 ) -> tuple[IntArray, dict[str, IntArray]]:
-    """Return rows, and for `Fusion.combine` entries, of fused detections of one entry each.
+    """Return the rows and each sensor's entries of fused detections of a single entry.
 
     `taken` has by sensor the rows and the entries; they follow each other sensor by sensor.
     """

@@ -19,14 +19,18 @@ from components.geometry import (
 )
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, next_position_in_run
+from dsa_des.arrays.run_ticks import (
+    RunTicks,
+    first_position_at_or_after,
+    last_position_at_or_before,
+)
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters
 from dsa_des.block.wake import Arrivals, Wake
 
 
 class Entries(NamedTuple):
-    """The detections of one sensor, by entry."""
+    """One sensor's detections by entry, with their runs, times and the ownship's poses."""
 
     message: Any  # What was measured: azimuth, elevation, range and its rate
     run: IntArray
@@ -36,7 +40,7 @@ class Entries(NamedTuple):
 
     @classmethod
     def from_arrivals(cls, arrivals: Arrivals) -> "Entries":
-        """Return those of a sensor's reports."""
+        """Return the entries of all detections that arrived from a sensor."""
         message, row = arrivals.message, arrivals.message.row_of_entries
         made = message.measured_ticks()
         return cls(message, message.run[row], made, arrivals.tick[row], poses(message))
@@ -55,7 +59,7 @@ class Gates(NamedTuple):
 def extrapolate_entries(
     one: Entries, mine: IntArray, other: Entries, theirs: IntArray, ticks_per_s: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return azimuth, elevation and range of entries `theirs` at the instants of `mine`.
+    """Return azimuth, elevation (rad), range (m) of ``theirs`` moved to the times of ``mine``.
 
     What is known of the time between is how the ownship turned and moved, by the poses that it
     believed itself to have, and how the range changed, where its rate was measured. A target's
@@ -89,7 +93,7 @@ def extrapolate_entries(
 
 
 def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gates) -> IntArray:
-    """Return for each anchor, an entry of one, the entry of the other that belongs to it, or -1.
+    """Return for each anchor in ``one`` the index of its entry of ``other``, or -1.
 
     Of the entries in the gates those nearest in time count, of these the one nearest in angle,
     then in range. Nothing but measured values decides.
@@ -99,11 +103,11 @@ def nearest_in_gate(one: Entries, anchors: IntArray, other: Entries, gates: Gate
         return best
     asked = RunTicks(one.run[anchors], one.made[anchors])
     others = RunTicks(other.run, other.made)
-    order = others.order()
+    order = others.sort_indices()
     in_time = np.arange(len(others)) if order is None else order
     others = others.take(in_time)
-    first = next_position_in_run(others, asked.later(-gates.ticks))
-    counts = next_position_in_run(others, asked.later(gates.ticks + 1)) - first
+    first = first_position_at_or_after(others, asked.add_ticks(-gates.ticks))
+    counts = first_position_at_or_after(others, asked.add_ticks(gates.ticks + 1)) - first
     which = np.repeat(np.arange(len(anchors)), counts)
     start = np.repeat(np.cumsum(counts) - counts, counts)
     candidate = in_time[np.arange(len(which)) - start + np.repeat(first, counts)]
@@ -148,7 +152,7 @@ class GatedParameters(Parameters):
 
 
 class Gated(Fusion):
-    """Puts detections of different sensors together that lie within gates of time and place.
+    """Combines different sensors' detections within gates of time, direction and range.
 
     Nothing is known of who was detected: two aircraft in one gate may be mixed, and a false alarm
     may join a detection, as in a real system. At every instant the sensors that report are taken
@@ -200,7 +204,7 @@ class Gated(Fusion):
         for anchor in order:
             mine, one = np.flatnonzero(free[anchor]), seen[anchor]
             rows.append(
-                last_position_in_run(wake.instants, RunTicks(one.run[mine], one.came[mine]))
+                last_position_at_or_before(wake.instants, RunTicks(one.run[mine], one.came[mine]))
             )
             anchors.append((anchor, mine))
             for other in order:
@@ -224,7 +228,7 @@ class Gated(Fusion):
         anchors: list[tuple[str, IntArray]],
         arrivals: dict[str, Arrivals],
     ) -> IntArray:
-        """Return the order of fused detections: by instant, sensor and what was measured."""
+        """Return the indices that sort fused detections by instant, sensor and measured values."""
         taken = [(arrivals[name].message, mine) for name, mine in anchors]
         measured = [
             np.concatenate([getattr(message, column)[mine] for message, mine in taken])
@@ -236,7 +240,7 @@ class Gated(Fusion):
     def _targets(
         self, entries: dict[str, IntArray], arrivals: dict[str, Arrivals], order: list[str]
     ) -> IntArray:
-        """Return the target of each fused detection, for the record: nothing here rests on it."""
+        """Return each fused detection's true target, which is recorded but decides nothing."""
         target = np.full(len(next(iter(entries.values()))), FALSE_TARGET, dtype=np.int64)
         for name in reversed(order):
             entry = entries[name]

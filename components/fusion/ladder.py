@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from components.geometry import unit_vectors
-from components.messages.false_detections import true_entries
-from components.sensor.ladder_values import angle_apart_mrad
+from components.messages.false_detections import without_false_alarms
+from components.sensor.ladder_values import angle_between_vectors_mrad
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -14,19 +14,19 @@ from dsa_des.block.wake import Wake
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return how far each fused line of sight is from the true one at its instant.
+    """Return fused lines of sight's errors by row and target: direction (mrad), range (m).
 
     Rungs fuse other rows, so they are compared with the truth and not row by row with each other.
     """
     fused: Any = block.run(wake)
     if fused is None:
         return {"direction": np.empty((0, 0)), "range": np.empty((0, 0))}
-    fused = true_entries(fused)
+    fused = without_false_alarms(fused)
     shape = (len(wake), len(fused.roster))
     row = np.searchsorted(wake.ticks, np.repeat(fused.tick, np.diff(fused.offsets)))
     line: FloatArray = np.full(shape, np.nan)
     distance: FloatArray = np.full(shape, np.nan)
-    line[row, fused.target] = angle_apart_mrad(
+    line[row, fused.target] = angle_between_vectors_mrad(
         unit_vectors(fused.azimuth_rad, fused.elevation_rad),
         unit_vectors(fused.true_azimuth_rad, fused.true_elevation_rad),
     )
@@ -35,7 +35,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
 
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the same for the reference: sensors' grids are part of it."""
+    """Return the same errors for the reference block, at the given cells (row, target)."""
     row, target = cells.T
     return {name: values[row, target] for name, values in measure(block, wake, block).items()}
 

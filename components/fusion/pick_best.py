@@ -14,7 +14,7 @@ from components.fusion.ladder import FUSION_LADDER
 from components.messages.detections import SensorOffer
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.run_ticks import last_position_in_run, positions_among
+from dsa_des.arrays.run_ticks import last_position_at_or_before, positions_with_found_mask
 from dsa_des.arrays.sorted_union import sorted_union
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters, Producer
@@ -32,7 +32,7 @@ class PickBestParameters(Parameters):
 
 
 class PickBest(Fusion):
-    """Puts together, per target, the best of what the sensors report.
+    """Combines, for each true target, the best values that the sensors report.
 
     Range comes from a sensor that measures it, angles from one that does not (an optical one)
     where there is one; among equals the finest angular resolution wins, then the name. What is
@@ -44,7 +44,7 @@ class PickBest(Fusion):
     ladders = (FUSION_LADDER,)
 
     def skipped_work_notes(self) -> list[str]:
-        """Return a sentence on how detections are combined here."""
+        """Return a note that detections are combined by their true targets."""
         return [
             "association by truth: detections of the same target are put together, whatever was "
             "measured, and a false alarm with none (fusion.gated goes by measured values alone)"
@@ -55,8 +55,10 @@ class PickBest(Fusion):
         return self.p.coincidence_s
 
     def warnings(self) -> list[str]:
-        """Return a warning where the sensors' reports never fall within ``coincidence_s``."""
-        clocks = [clock for one in self.context.producers if (clock := _reports(one)) is not None]
+        """Return a warning if no two sensors ever report within ``coincidence_s`` of each other."""
+        clocks = [
+            clock for one in self.context.producers if (clock := _report_clock(one)) is not None
+        ]
         if len(clocks) < 2 or len(clocks) < len(self.context.producers):
             return super().warnings()
         apart_s = min(closest_clock_distance_s(*pair) for pair in combinations(clocks, 2))
@@ -74,9 +76,10 @@ class PickBest(Fusion):
         if not arrivals:
             return None
         width = max(1, len(next(iter(arrivals.values())).message.roster))
-        true = [_true_entries(new) for new in arrivals.values()]
+        true = [_entries_of_targets(new) for new in arrivals.values()]
         keys = [
-            _keys(new, wake, width, of) for new, of in zip(arrivals.values(), true, strict=True)
+            _instant_target_keys(new, wake, width, of)
+            for new, of in zip(arrivals.values(), true, strict=True)
         ]
         union, positions = sorted_union(keys)
         row = union // width
@@ -102,11 +105,11 @@ class PickBest(Fusion):
     def _false_alarms(
         self, arrivals: Mapping[str, Arrivals], wake: Wake
     ) -> dict[str, tuple[IntArray, IntArray]]:
-        """Return row and entry of the false alarms that came now, by sensor in order of rank."""
+        """Return by sensor, in order of rank, rows and entries of false alarms arrived now."""
         result = {}
         for name in (name for name in self.sensors if name in arrivals):
             new = arrivals[name]
-            at, now = positions_among(wake.instants, new.instants)
+            at, now = positions_with_found_mask(wake.instants, new.instants)
             row = new.message.row_of_entries
             false = new.message.target == FALSE_TARGET
             entry = np.flatnonzero(false if now is None else false & now[row])
@@ -114,8 +117,8 @@ class PickBest(Fusion):
         return result
 
 
-def _reports(sensor: Producer) -> tuple[Fraction, Fraction] | None:
-    """Return when a sensor's reports come, first and how often (s); None where that varies."""
+def _report_clock(sensor: Producer) -> tuple[Fraction, Fraction] | None:
+    """Return a sensor's first report time (s) and its period, or None if it is irregular."""
     offer = sensor.offer
     if not isinstance(offer, SensorOffer) or offer.clock is None:
         return None
@@ -139,14 +142,14 @@ def closest_clock_distance_s(
     return min(apart_s, step_s - apart_s)
 
 
-def _true_entries(new: Arrivals) -> IntArray | None:
-    """Return the entries that are of a target; None where all are."""
+def _entries_of_targets(new: Arrivals) -> IntArray | None:
+    """Return the indices of the entries that belong to a target, or None if all of them do."""
     true = new.message.target != FALSE_TARGET
     return None if true.all() else np.flatnonzero(true)
 
 
-def _keys(new: Arrivals, wake: Wake, width: int, of: IntArray | None) -> IntArray:
-    """Return instant · width + target of some entries."""
-    row = last_position_in_run(wake.instants, new.instants)  # they are among them
+def _instant_target_keys(new: Arrivals, wake: Wake, width: int, of: IntArray | None) -> IntArray:
+    """Return for each entry a key made of the index of its instant and of its target."""
+    row = last_position_at_or_before(wake.instants, new.instants)  # they are among them
     keys = row.take(new.message.row_of_entries) * width + new.message.target
     return keys if of is None else keys[of]

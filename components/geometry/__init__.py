@@ -15,7 +15,6 @@ from components.geometry.angles import (
     longitude_difference_deg,
     longitude_difference_rounded,
     normal_to_degrees,
-    positive_turn,
     remainder,
     sine_and_cosine,
     slope_angle,
@@ -23,19 +22,20 @@ from components.geometry.angles import (
     wrap_difference_rad,
     wrap_heading_rad,
     wrap_longitude_deg,
+    wrap_negative_to_positive_rad,
     wrap_pi,
     wrap_pi_unchecked,
     wrap_two_pi,
 )
 from components.geometry.attitude import (
     aspect_angles,
-    azimuth_off_nose,
     body_angles,
     body_angles_unchecked,
     body_to_ned,
     line_of_sight_in_target_axes,
     ned_to_body,
     ned_to_body_unchecked,
+    normalize_azimuths,
     relative_attitude,
     turn_axes,
     unit_vector,
@@ -74,9 +74,9 @@ from components.geometry.ellipsoid import (
 from components.geometry.field_of_view import FieldOfView, sector_width_rad, unwrap_sector
 from components.geometry.meridians import (
     NEAR_A_POLE_DEG,
-    level_parts,
+    meridian_convergence_rad,
+    north_east_parts,
     rotate_to_meridian,
-    turn_of_north_rad,
 )
 from components.geometry.sensor_axes import (
     rotate_variances,

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import broadcast_results, common_shape, squarable
-from dsa_des.arrays.column_values import first_row_if_constant
+from components.arguments.checks import broadcast_results, check_squarable, common_shape
+from dsa_des.arrays.column_values import first_row_if_stored_once
 from dsa_des.arrays.types import FloatArray
 
 Vector = tuple[FloatArray, FloatArray, FloatArray]
@@ -31,7 +31,7 @@ def local_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[Vector, Vector
 
 
 def normal_to_degrees(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Turn a normal of any length into latitude and longitude in degrees.
+    """Return latitude, longitude (deg) of an ellipsoid normal, a vector of any length.
 
     Parameters
     ----------
@@ -70,7 +70,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
         The same shape, radians, reduced by the true 2 pi (not the double nearest to it), so that
         many turns lose nothing beyond what the input itself had lost.
     """
-    angle = squarable("angle_rad", angle_rad)
+    angle = check_squarable("angle_rad", angle_rad)
     (wrapped,) = broadcast_results(angle.shape, wrap_pi_unchecked(np.atleast_1d(angle)))
     return wrapped
 
@@ -107,16 +107,16 @@ def wrap_by_sines(angle: FloatArray) -> FloatArray:
 
 def wrap_two_pi(angle_rad: npt.ArrayLike) -> FloatArray:
     """Wrap radians of any size into [0, 2 pi), as `wrap_pi` does; rounding never gives 2 pi."""
-    angle = squarable("angle_rad", angle_rad)
+    angle = check_squarable("angle_rad", angle_rad)
     flat = np.atleast_1d(angle)
     inside = (flat >= 0.0) & (flat < TWO_PI)
-    wrapped = np.where(inside, flat, positive_turn(wrap_pi_unchecked(flat))) + 0.0
+    wrapped = np.where(inside, flat, wrap_negative_to_positive_rad(wrap_pi_unchecked(flat))) + 0.0
     (wrapped,) = broadcast_results(angle.shape, wrapped)
     return wrapped
 
 
-def positive_turn(angle: FloatArray) -> FloatArray:
-    """Move angles in [-pi, pi], as arctan2 gives them, to [0, 2 pi)."""
+def wrap_negative_to_positive_rad(angle: FloatArray) -> FloatArray:
+    """Return angles in [-pi, pi], as arctan2 gives them, as angles in [0, 2 pi)."""
     below = angle < 0.0
     if not np.count_nonzero(below):
         return angle + 0.0
@@ -192,7 +192,7 @@ def sine_and_cosine(angle_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
         The angle's shape, one row of it where all rows are known to be the same, or (1,) in its
         place where all angles are.
     """
-    angle_rad = first_row_if_constant(angle_rad)
+    angle_rad = first_row_if_stored_once(angle_rad)
     if angle_rad.size > _LOOK_FOR_ONE_ANGLE and angle_rad.min() == angle_rad.max():
         angle_rad = angle_rad.reshape(-1)[:1]
     return np.sin(angle_rad), np.cos(angle_rad)
@@ -256,7 +256,7 @@ def longitude_difference_deg(
     The idea is that of `AngDiff` in GeographicLib (C. F. F. Karney, "Algorithms for geodesics",
     Journal of Geodesy 87, 2013).
     """
-    lon1, lon2 = squarable("lon1_deg", lon1_deg), squarable("lon2_deg", lon2_deg)
+    lon1, lon2 = check_squarable("lon1_deg", lon1_deg), check_squarable("lon2_deg", lon2_deg)
     shape = common_shape(lon1_deg=lon1, lon2_deg=lon2)
     difference, error = _longitude_difference(np.atleast_1d(lon1), np.atleast_1d(lon2))
     difference, error = broadcast_results(shape, difference, error)
@@ -292,7 +292,7 @@ def _reduce_longitude(lon: FloatArray) -> FloatArray:
 
 
 def _two_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Knuth's two-sum of lon2 and -lon1: the rounded sum and what rounding left out."""
+    """Return lon2 - lon1 as rounded, and the rounding error (Knuth's two-sum)."""
     total = lon2 - lon1
     part1 = total - lon2
     part2 = total - part1
@@ -303,7 +303,7 @@ def _two_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _wrap_sum(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Wrap total + low; returns the wrapped double and total less its whole turns."""
+    """Return total + low wrapped into [-180, 180) degrees, and total less its whole turns."""
     rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
     difference = rest + low
     over = (difference >= 180.0) | (difference < -180.0)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import broadcast_results, common_shape, squarable
+from components.arguments.checks import broadcast_results, check_squarable, common_shape
 from components.geometry.angles import Vector, sine_and_cosine, wrap_pi
 from dsa_des.arrays.types import FloatArray
 
@@ -139,7 +139,8 @@ def relative_attitude(
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
 ) -> Vector:
-    """Find the target's attitude relative to the line of sight, angle by angle (thesis eq. 6).
+    """Return the target's yaw, pitch and roll relative to the line of sight, angle by angle (thesis
+    eq. 6).
 
     A small-angle form of `line_of_sight_in_target_axes`, which has the same arguments: the sign of
     the elevation is right only for a receding target, and roll shares its axis with elevation only
@@ -202,7 +203,7 @@ def aspect_angles(
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
 ) -> tuple[FloatArray, FloatArray]:
-    """Find from which side the observer sees the target, exactly.
+    """Return azimuth, elevation (rad) from target to observer in the target's body axes.
 
     Arguments and frames are those of `line_of_sight_in_target_axes`.
 
@@ -239,11 +240,11 @@ def body_angles_unchecked(
 ) -> tuple[FloatArray, FloatArray]:
     """`body_angles` for contiguous arrays of one shape."""
     level = np.hypot(x, y)
-    return azimuth_off_nose(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
+    return normalize_azimuths(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
 
 
-def azimuth_off_nose(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
-    """Return azimuths in (-pi, pi], 0 along z; level is hypot(x, y)."""
+def normalize_azimuths(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> FloatArray:
+    """Put azimuths into (-pi, pi] in place, 0 along z; return them; ``level`` is hypot(x, y)."""
     azimuth[azimuth <= -np.pi] = np.pi
     azimuth[level <= _ZENITH_RAD * np.abs(z)] = 0.0
     azimuth += 0.0
@@ -251,13 +252,15 @@ def azimuth_off_nose(azimuth: FloatArray, z: FloatArray, level: FloatArray) -> F
 
 
 def turn_axes(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Components of a plane vector in axes turned by the angle from a towards b."""
+    """Return a plane vector (a, b) in axes that are turned by the angle from a towards b."""
     sine, cosine = sine_and_cosine(angle)
     return cosine * a + sine * b, cosine * b - sine * a
 
 
 def check_arguments(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Check named arguments; returns the broadcast shape and arrays of at least one axis."""
-    arrays = {name: squarable(name, value) for name, value in values.items()}
+    """Check named arguments and return their common shape, and each as a float array with at least
+    one axis.
+    """
+    arrays = {name: check_squarable(name, value) for name, value in values.items()}
     shape = common_shape(**arrays)
     return shape, [a if a.ndim else a.reshape(1) for a in arrays.values()]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import angle, broadcast_flat, unflatten
+from components.arguments.checks import broadcast_flat, check_angle_rad, unflatten
 from components.geometry.angles import Vector
 from components.geometry.attitude import unit_vector_unchecked
 from dsa_des.arrays.types import FloatArray
@@ -41,10 +41,10 @@ def angle_between(
         In [0, pi].
     """
     shape, flat = broadcast_flat(
-        first_azimuth_rad=angle("first_azimuth_rad", first_azimuth_rad),
-        first_elevation_rad=angle("first_elevation_rad", first_elevation_rad),
-        second_azimuth_rad=angle("second_azimuth_rad", second_azimuth_rad),
-        second_elevation_rad=angle("second_elevation_rad", second_elevation_rad),
+        first_azimuth_rad=check_angle_rad("first_azimuth_rad", first_azimuth_rad),
+        first_elevation_rad=check_angle_rad("first_elevation_rad", first_elevation_rad),
+        second_azimuth_rad=check_angle_rad("second_azimuth_rad", second_azimuth_rad),
+        second_elevation_rad=check_angle_rad("second_elevation_rad", second_elevation_rad),
     )
     p1, q1, p2, q2 = flat
     turn, climb = p2 - p1, q2 - q1

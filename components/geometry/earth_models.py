@@ -35,8 +35,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import broadcast_results, positions
-from components.geometry.angles import RAD_PER_DEG, longitude_difference_rounded, positive_turn
+from components.arguments.checks import broadcast_results, check_positions
+from components.geometry.angles import (
+    RAD_PER_DEG,
+    longitude_difference_rounded,
+    wrap_negative_to_positive_rad,
+)
 from components.geometry.ellipsoid import north_east_up, radii_of_curvature, spherical_from_enu
 from components.geometry.sensor_axes import MODELS as ATTITUDE_MODELS
 from components.geometry.sensor_axes import sensor_angles, sensor_angles_of_offsets
@@ -60,7 +64,8 @@ def flat_earth_offsets(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return north, east, up over a plane of 111,195 m per degree (thesis eq. 1-5, corrected).
+    """Return north, east and up offsets (m) of point 2 from point 1 on a flat Earth of 111,195 m
+    per degree (thesis eq. 1-5, corrected).
 
     Thesis eq. 2 exchanges X and Y and takes the cosine of a longitude; eq. 5 has asin(h/R). Here
     east = wrap(dlon)·111195·cos(latitude of the ownship), north = dlat·111195 and
@@ -80,7 +85,7 @@ def local_radii_offsets(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return north, east, up over a plane scaled by the ellipsoid's radii at the ownship.
+    """Return north, east, up offsets (m) of point 2 from point 1, by the radii at point 1.
 
     north = (M + h)·dlat, east = (N + h)·cos(lat)·dlon, up = dh, with the meridian radius M and
     the prime vertical radius N of WGS-84 at the ownship's latitude, and h the ownship's altitude.
@@ -95,7 +100,7 @@ def local_radii_offsets(
 def east_north_m(
     lat_rad: FloatArray, lon_rad: FloatArray, own_lat_rad: FloatArray, own_lon_rad: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a position east and north of the ownship (m), all arrays of one shape.
+    """Return how far east and north (m) of the ownship a position lies, all of one shape.
 
     In the plane that touches the sphere below the ownship.
     """
@@ -121,7 +126,7 @@ def east_north_mps(
     own_lat_rad: FloatArray,
     own_lon_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return a velocity (m/s) in the plane that touches the sphere below the ownship.
+    """Return a velocity's east and north (m/s) in the sphere's tangent plane at the ownship.
 
     Its position and its velocity over ground there are given, of one shape, the ownship itself too.
     The result is the mean over the next ten seconds along a great circle.
@@ -147,7 +152,8 @@ def daidalus_sphere_offsets(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return north, east, up in the plane of `east_north_m`, without cancellation close by.
+    """Return north, east and up offsets (m) of point 2 from point 1 in the plane of `east_north_m`,
+    accurate also close by.
 
     Beyond a quarter of the way around the Earth the projection comes back: what is there seems
     nearer than it is.
@@ -205,7 +211,7 @@ def geodesic_line_of_sight(
     if backend not in BACKENDS:
         allowed = " or ".join(repr(name) for name in BACKENDS)
         raise ValueError(f"backend is {backend!r}: it must be {allowed}")
-    arrays, shape = positions(
+    arrays, shape = check_positions(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     lat1, lon1, alt1, lat2, lon2, alt2 = (
@@ -214,7 +220,7 @@ def geodesic_line_of_sight(
     inverse = _inverse_pyproj if backend == "pyproj" else _inverse_geographiclib
     azimuth_deg, ground = inverse(lat1, lon1, lat2, lon2)
     # For coincident points the geodesic's azimuth is a convention (180 in PROJ); ours is 0.
-    azimuth = positive_turn(np.where(ground == 0.0, 0.0, azimuth_deg) * RAD_PER_DEG)
+    azimuth = wrap_negative_to_positive_rad(np.where(ground == 0.0, 0.0, azimuth_deg) * RAD_PER_DEG)
     rise = alt2 - alt1
     with np.errstate(under="ignore"):
         result = azimuth, np.arctan2(rise, ground), np.hypot(ground, rise)
@@ -327,7 +333,8 @@ class LineOfSight:
         return self._in_ned(coordinates, validate=True)
 
     def from_ownship(self, own: Any, other: Any) -> SeenFromOwnship:
-        """Find where the ownship sees targets, in NED and in its body axes, without checks.
+        """Return azimuth, elevation and range of targets from the ownship in NED, and azimuth and
+        elevation in its body axes, without checks.
 
         Both have ``lat_deg``, ``lon_deg`` and ``alt_m``, the ownship ``yaw_rad``, ``pitch_rad`` and
         ``roll_rad`` as well: finite doubles of one axis up that broadcast, the targets' of the
@@ -350,7 +357,7 @@ class LineOfSight:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         if self._offsets is None:
             return geodesic_line_of_sight(*coordinates, validate=validate)
-        arrays, shape = positions(*coordinates, validate=validate)
+        arrays, shape = check_positions(*coordinates, validate=validate)
         with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
             seen = spherical_from_enu(*self._offsets(*arrays))
         azimuth, elevation, range_m = broadcast_results(shape, *seen)

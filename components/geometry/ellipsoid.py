@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from components.arguments.checks import broadcast_results, positions
+from components.arguments.checks import broadcast_results, check_positions
 from components.geometry.angles import (
     RAD_PER_DEG,
     direction_angle,
     local_axes,
     longitude_difference_rounded,
-    positive_turn,
     slope_angle,
     wrap_longitude_deg,
+    wrap_negative_to_positive_rad,
 )
 from dsa_des.arrays.types import FloatArray
 
@@ -65,7 +65,7 @@ def line_of_sight(
     -----
     See `line_of_sight_ned` for the formula and the error.
     """
-    arrays, shape = positions(
+    arrays, shape = check_positions(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     # Offsets below 1e-150 m square to zero, which is right to every digit asked for.
@@ -87,7 +87,9 @@ def slant_range_m(
 
     Arguments are those of `line_of_sight`, in bounds: their values are not checked.
     """
-    arrays, shape = positions(own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, False)
+    arrays, shape = check_positions(
+        own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, False
+    )
     with np.errstate(under="ignore"):
         north, east, up = north_east_up(*arrays)
         (range_m,) = broadcast_results(shape, np.sqrt(north * north + east * east + up * up))
@@ -104,7 +106,7 @@ def line_of_sight_ned(
     *,
     validate: bool = True,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find the target's north, east and down offsets in the observer's local NED frame.
+    """Return the target's north, east and down offsets (m) in the observer's local NED frame.
 
     Parameters
     ----------
@@ -144,7 +146,7 @@ def line_of_sight_ned(
     range as in NED. About 0.1 us per pair in blocks of 10,000; 50-60 us for a call with a
     few targets, which is why sensors evaluate windows of scans.
     """
-    arrays, shape = positions(
+    arrays, shape = check_positions(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     with np.errstate(under="ignore"):
@@ -176,7 +178,7 @@ def spherical_from_enu(
     elevation = slope_angle(up, level)
     level_squared += up * up
     slant_range = np.sqrt(level_squared, out=level_squared)
-    return positive_turn(direction_angle(east, north)), elevation, slant_range
+    return wrap_negative_to_positive_rad(direction_angle(east, north)), elevation, slant_range
 
 
 def north_east_up(
@@ -251,7 +253,7 @@ def north_east_up(
 
 
 def _cosine_from_sine(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
-    """Cosine of degrees in ±90 whose sine is known: a square root where it loses nothing."""
+    """Return the cosine of degrees in ±90 from the sine, or anew where that would lose digits."""
     cosine = 1.0 - sine
     cosine *= 1.0 + sine
     np.sqrt(cosine, out=cosine)
@@ -264,7 +266,9 @@ def _cosine_from_sine(sine: FloatArray, angle_deg: FloatArray) -> FloatArray:
 def _cosine_of_target(
     lat2: FloatArray, sin1: FloatArray, cos1: FloatArray, sin_half: FloatArray, cos_half: FloatArray
 ) -> FloatArray:
-    """Cosine of the target's latitude, from ours and half the difference where nothing cancels."""
+    """Return the cosine of the target's latitude from the own latitude and half the difference, or
+    computed anew where digits would cancel.
+    """
     fall = sin1 * cos_half
     fall += cos1 * sin_half
     fall *= sin_half
@@ -363,7 +367,7 @@ def _first_guess(
     lon0: FloatArray,
     alt0: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Bowring's one-step latitude, in the reference meridian's plane."""
+    """Return a first guess of latitude, longitude (deg), altitude (m) by Bowring's formula."""
     sin0, cos0 = np.sin(np.radians(lat0)), np.cos(np.radians(lat0))
     n0 = radii_of_curvature(lat0)[1]
     outward = (n0 + alt0) * cos0 - north * sin0 + up * cos0

@@ -72,7 +72,7 @@ _METRES_PER_RAD = math.degrees(METRES_PER_DEGREE)
 
 @dataclass(frozen=True)
 class Envelope:
-    """Where a scene's lines of sight can lie."""
+    """Bounds on the ranges, positions and attitudes between which a scene's lines of sight lie."""
 
     range_max_m: float  # Longest line of sight that a sensor looks along
     # (low, high): geodetic latitude of the ownship, altitudes of the ownship and of its targets
@@ -96,8 +96,8 @@ class Envelope:
 
 
 def flat_earth_error(envelope: Envelope) -> Interval | None:
-    """Return the largest angle (rad) and relative error of range of flat earth, or None."""
-    meridian, prime_vertical = _radii(*_sizes(envelope.own_lat_deg))
+    """Return the flat Earth's largest direction (rad) and relative range error; None if unknown."""
+    meridian, prime_vertical = _radius_ranges(*_abs_latitude_range(envelope.own_lat_deg))
     low_alt, high_alt = envelope.own_alt_m
     if meridian[0] + low_alt <= 0.0:
         return None
@@ -108,21 +108,25 @@ def flat_earth_error(envelope: Envelope) -> Interval | None:
         return None
     angle, relative = local
     stretch = max(most - 1.0, 1.0 / least - 1.0)
-    return angle + _largest_turn(least, most), stretch * (1.0 + relative) + relative / least
+    return angle + _largest_direction_change_rad(least, most), stretch * (
+        1.0 + relative
+    ) + relative / least
 
 
 def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
-    """Return the largest angle (rad) and relative error of range up to a range, or None."""
+    """Return the largest direction error (rad) and relative range error of the local-radii model up
+    to a range, or None if no bound is known.
+    """
     low_alt = min(envelope.own_alt_m[0], envelope.target_alt_m[0])
     high_alt = max(envelope.own_alt_m[1], envelope.target_alt_m[1], 0.0)
     if range_m > 2.0 * _LARGEST_SINE * (_M_EQUATOR + low_alt):
         return None
     widest = math.degrees(2.0 * math.asin(range_m / (2.0 * (_M_EQUATOR + low_alt))))
-    south, north = _span(envelope, widest)
+    south, north = _latitude_span(envelope, widest)
     if south <= -90.0 or north >= 90.0:
         return None
-    low, high = _sizes((south, north))
-    (m_min, m_max), (n_min, n_max) = _radii(low, high)
+    low, high = _abs_latitude_range((south, north))
+    (m_min, m_max), (n_min, n_max) = _radius_ranges(low, high)
     cos_max, cos_min = math.cos(math.radians(low)), math.cos(math.radians(high))
     sin_max = math.sin(math.radians(high))
     rho = m_min + low_alt
@@ -172,7 +176,9 @@ def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
 
 
 def geodesic_error(envelope: Envelope) -> Interval | None:
-    """Return the largest angle (rad) and relative error of range of the geodesic, or None."""
+    """Return the largest direction error (rad) and the largest relative range error of the geodesic
+    model, or None if no bound is known.
+    """
     low_alt = min(envelope.own_alt_m[0], envelope.target_alt_m[0], 0.0)
     rho = _M_EQUATOR + low_alt
     range_m = envelope.range_max_m
@@ -195,13 +201,13 @@ def geodesic_error(envelope: Envelope) -> Interval | None:
     angle, relative = rest
     stretch = max(most - 1.0, 1.0 - least)
     off = 1.0 + math.hypot(level, drop) / range_m
-    return angle + _largest_turn(least, most), stretch * off / least + relative
+    return angle + _largest_direction_change_rad(least, most), stretch * off / least + relative
 
 
 def _bound_by_offsets(
     level_m: float, drop_m: float, rise_m: float, range_m: float, shortest_m: float
 ) -> Interval | None:
-    """Return angle and relative error of range from errors of the level and vertical offsets.
+    """Return direction (rad) and relative range error bounds from offset errors (m), or None.
 
     With offsets v and v' of lengths R and R', R' - R = (v' + v)·(v' - v)/(R' + R): the error of
     the level offset counts in full, that of the vertical one by the slope (u + u')/(R + R').
@@ -220,8 +226,8 @@ def _largest_hypot(to_axis: float, convergence: float) -> float:
     return math.sqrt(share * (c - (c - p) * share))
 
 
-def _largest_turn(least: float, most: float) -> float:
-    """Return the largest turn of a vector whose components are stretched by least to most."""
+def _largest_direction_change_rad(least: float, most: float) -> float:
+    """Return the largest turn (rad) of a vector with components scaled by least to most."""
     return math.asin((most - least) / (most + least))
 
 
@@ -230,8 +236,8 @@ def _largest_rise(envelope: Envelope) -> float:
     return max(target[1] - own[0], own[1] - target[0])
 
 
-def _span(envelope: Envelope, widest_deg: float) -> Interval:
-    """Return the latitudes of the ownship and of all targets that far from it."""
+def _latitude_span(envelope: Envelope, widest_deg: float) -> Interval:
+    """Return the lowest and highest latitude (deg) of ownship and targets within ``widest_deg``."""
     low, high = envelope.own_lat_deg
     south, north = low - widest_deg, high + widest_deg
     if envelope.target_lat_deg is not None:
@@ -240,14 +246,16 @@ def _span(envelope: Envelope, widest_deg: float) -> Interval:
     return min(low, south), max(high, north)
 
 
-def _sizes(lat_deg: Interval) -> Interval:
-    """Return the smallest and the largest |latitude| of an interval."""
+def _abs_latitude_range(lat_deg: Interval) -> Interval:
+    """Return the smallest and the largest absolute latitude (deg) in an interval of latitudes."""
     low, high = lat_deg
     return (0.0 if low <= 0.0 <= high else min(abs(low), abs(high))), max(abs(low), abs(high))
 
 
-def _radii(low_deg: float, high_deg: float) -> tuple[Interval, Interval]:
-    """Return the extremes of both radii of curvature between two sizes of latitude."""
+def _radius_ranges(low_deg: float, high_deg: float) -> tuple[Interval, Interval]:
+    """Return the smallest and largest meridian radius, and the same of the prime vertical radius
+    (m), between two absolute latitudes.
+    """
     meridian, prime_vertical = radii_of_curvature([low_deg, high_deg])
     return (
         (float(meridian[0]), float(meridian[1])),
@@ -291,17 +299,19 @@ class ErrorBound:
 
     @property
     def elevation_rad(self) -> float:
-        """Error of the elevation in body axes: as a rolled aircraft reads it, the direction's."""
+        """Bound on the elevation error (rad) in body axes, which is that of the direction, as a
+        rolled aircraft reads it.
+        """
         return self.direction_rad
 
     @property
     def angle_rad(self) -> float:
-        """Error of any angle: direction, elevation and azimuth."""
+        """Bound (rad) on direction, elevation and azimuth errors, the largest of the three."""
         return max(self.direction_rad, self.azimuth_rad)
 
 
 def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> ErrorBound:
-    """Bound the error of a model of the Earth and of the attitude over an envelope.
+    """Return bounds on the errors of an Earth model and an attitude model over an envelope.
 
     Over usual envelopes (10 to 30 km, within 70 degrees
     of latitude) the bounds are 1.0 to 1.7 times the worst direction found by search, and 1.0 to
@@ -339,8 +349,11 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
     )
 
 
-def true_reach_m(earth: str, reach_m: float, own_lat_deg: Interval, own_alt_m: Interval) -> float:
-    """Return a true range beyond which no target seems to be within a reach; infinite for none.
+def max_true_range_m(
+    earth: str, reach_m: float, own_lat_deg: Interval, own_alt_m: Interval
+) -> float:
+    """Return a true range (m) beyond which no target appears to be within ``reach_m`` by a model of
+    the Earth; infinite if there is none.
 
     With a relative error e of the range, proven for all targets that seem to be in reach, these
     are within R / (1 - e).
@@ -367,7 +380,9 @@ def attitude_error_rad(pitch_rad: float, roll_rad: float) -> float:
 
 
 def azimuth_error_rad(direction_rad: float, steepest_rad: float) -> float:
-    """Bound the error in azimuth of a direction that is off, at elevations up to the steepest."""
+    """Return a bound (rad) on the azimuth error of a direction with an error of ``direction_rad``,
+    at elevations up to the steepest.
+    """
     if direction_rad == 0.0:
         return 0.0
     if direction_rad + steepest_rad >= 0.5 * math.pi:

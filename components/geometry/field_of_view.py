@@ -30,7 +30,7 @@ class FieldOfView:
     def __init__(
         self, azimuth_rad: tuple[float, float], elevation_rad: tuple[float, float]
     ) -> None:
-        self._low, self._high = _azimuth_bounds(*azimuth_rad)
+        self._low, self._high = _checked_azimuth_bounds(*azimuth_rad)
         for name, elevation in zip(("min", "max"), elevation_rad, strict=True):
             _require(f"elevation_{name}_rad", elevation, 0.5 * math.pi, "[-pi/2, pi/2]")
         self._lowest, self._highest = elevation_rad
@@ -39,7 +39,7 @@ class FieldOfView:
                 f"elevation_min_rad is {self._lowest}: it must not exceed elevation_max_rad, "
                 f"{self._highest}"
             )
-        self._turns = _turns(self._low, self._high)
+        self._turns = _azimuth_shifts_rad(self._low, self._high)
 
     def holds(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> BoolArray:
         """Return which directions lie inside the field of view, its bounds included."""
@@ -67,7 +67,7 @@ def sector_width_rad(low_rad: float, high_rad: float) -> float:
     return high_rad - low_rad if high_rad > low_rad else high_rad - low_rad + TWO_PI
 
 
-def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[float, float]:
+def _checked_azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[float, float]:
     _require("azimuth_min_rad", azimuth_min_rad, TWO_PI, "[-2 pi, 2 pi]")
     _require("azimuth_max_rad", azimuth_max_rad, TWO_PI, "[-2 pi, 2 pi]")
     low, high = unwrap_sector(float(azimuth_min_rad), float(azimuth_max_rad))
@@ -79,8 +79,8 @@ def _azimuth_bounds(azimuth_min_rad: float, azimuth_max_rad: float) -> tuple[flo
     return low, high
 
 
-def _turns(low: float, high: float) -> list[float]:
-    """Return the whole turns by which an azimuth may have to be moved to lie in the field."""
+def _azimuth_shifts_rad(low: float, high: float) -> list[float]:
+    """Return whole turns (rad) by which an azimuth may be shifted into the field of view."""
     shifts = [turns * TWO_PI for turns in (-2.0, -1.0, 1.0, 2.0)]
     # A margin of 1 rad only decides whether the comparison is worth doing.
     return [s for s in shifts if s - math.pi <= high + 1.0 and s + math.pi >= low - 1.0]

@@ -12,11 +12,11 @@ Place = tuple[ArrayLike, ArrayLike]
 NEAR_A_POLE_DEG = 89.0
 
 
-def level_parts(
+def north_east_parts(
     axis: FloatArray, sideways: FloatArray, outward: FloatArray, lat_deg: ArrayLike,
     lon_deg: ArrayLike,
 ) -> tuple[FloatArray, FloatArray]:  # fmt: skip
-    """Return the parts north and east at a place of vectors along axes fixed to the Earth.
+    """Return vectors' north and east parts at a place, given along three Earth-fixed axes.
 
     These are the Earth's axis, east of Greenwich at the equator, and outwards there. Of three
     independent numbers of one deviation both parts have it, and they are independent too.
@@ -27,8 +27,8 @@ def level_parts(
     return np.cos(lat) * axis - np.sin(lat) * level, east
 
 
-def turn_of_north_rad(here_deg: Place, there_deg: Place) -> FloatArray:
-    """Return by how much a heading is more from north there, near by, than here.
+def meridian_convergence_rad(here_deg: Place, there_deg: Place) -> FloatArray:
+    """Return how much larger (rad) a direction's heading is at a nearby place than here.
 
     Places are latitude and longitude. Of a mean sphere; near a pole, where it matters, exact.
     """
@@ -38,8 +38,8 @@ def turn_of_north_rad(here_deg: Place, there_deg: Place) -> FloatArray:
 
 
 def rotate_to_meridian(north_east_up: FloatArray, here_deg: Place, there_deg: Place) -> FloatArray:
-    """Return vectors (3, n) in north and east of a place near by."""
-    angle = turn_of_north_rad(here_deg, there_deg)
+    """Return vectors (3, n) of north, east and up here, by north, east and up nearby."""
+    angle = meridian_convergence_rad(here_deg, there_deg)
     north, east, up = north_east_up
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.stack([cosine * north - sine * east, sine * north + cosine * east, up])

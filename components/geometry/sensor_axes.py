@@ -11,18 +11,18 @@ import numpy.typing as npt
 from components.arguments.checks import broadcast_results
 from components.geometry.angles import direction_angle, slope_angle, wrap_pi_unchecked
 from components.geometry.attitude import (
-    azimuth_off_nose,
     body_angles,
     body_angles_unchecked,
     body_to_ned,
     check_arguments,
     ned_to_body,
     ned_to_body_unchecked,
+    normalize_azimuths,
     turn_axes,
     unit_vector,
     unit_vector_unchecked,
 )
-from dsa_des.arrays.column_values import first_row_if_constant
+from dsa_des.arrays.column_values import first_row_if_stored_once
 from dsa_des.arrays.types import FloatArray
 
 # Of an azimuth of which nothing is known: uniform over the circle.
@@ -36,7 +36,7 @@ def rotate_variances(
     elevation_variance_rad2: FloatArray,
     mounting_rad: tuple[float, float, float],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the variances of a direction's azimuth and elevation in the axes it is turned into.
+    """Return azimuth, elevation variances (rad²) in body axes, from those in sensor axes.
 
     Small errors turn with the tangent plane: those of the elevation and, shortened by the cosine
     of the elevation, of the azimuth are turned by the angle between the two verticals there. What
@@ -87,7 +87,7 @@ def sensor_angles(
     *,
     validate: bool = True,
 ) -> tuple[FloatArray, FloatArray]:
-    """Find where in its own axes the ownship sees a target: the thesis's angles p and q.
+    """Return azimuth, elevation (rad) of a sight line in the ownship's body axes (thesis p, q).
 
     Parameters
     ----------
@@ -165,7 +165,8 @@ def sensor_angles_of_offsets(
     pitch_rad: FloatArray,
     roll_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Find where in its own axes the ownship sees what lies at some offsets, without checks.
+    """Return azimuth and elevation (rad) in the ownship's body axes of what lies at some north,
+    east, up offsets, without checks.
 
     As `sensor_angles`, to the last digit or two, at a third to half of its cost: the direction need
     not be taken apart into angles first. All are contiguous arrays of finite doubles, at least one
@@ -173,13 +174,13 @@ def sensor_angles_of_offsets(
     """
     x, y = turn_axes(north_m, east_m, yaw_rad)
     z = 0.0 - up_m
-    if first_row_if_constant(
+    if first_row_if_stored_once(
         pitch_rad
     ).any():  # straight and level, as most fly most of the time, these change nothing
         z, x = turn_axes(z, x, pitch_rad)
-    if first_row_if_constant(roll_rad).any():
+    if first_row_if_stored_once(roll_rad).any():
         y, z = turn_axes(y, z, roll_rad)
     level = x * x
     level += y * y
     np.sqrt(level, out=level)
-    return azimuth_off_nose(direction_angle(y, x), z, level), slope_angle(0.0 - z, level)
+    return normalize_azimuths(direction_angle(y, x), z, level), slope_angle(0.0 - z, level)

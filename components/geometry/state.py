@@ -46,7 +46,7 @@ class TrajectoryState:
         return TrajectoryState(*(array.reshape(shape) for array in self.arrays()))
 
     def taken(self, which: IntArray) -> TrajectoryState:
-        """Return some of the states, of arrays with one axis."""
+        """Return the states at the given indices, for arrays with one axis."""
         return TrajectoryState(*(array.take(which) for array in self.arrays()))
 
     def arrays(self) -> tuple[np.ndarray, ...]:

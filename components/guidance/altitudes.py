@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.guidance.intervals import limits_of
-from components.guidance.situation import Detector, State, is_met_at, meets
+from components.guidance.situation import Detector, State, contains_instant, overlaps_time
 from components.well_clear.relative_motion import Span, nearly_equal
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -29,19 +29,21 @@ class Altitudes:
         self.values = np.broadcast_to(least + number * step, (len(own.up_m), len(number)))
         self.there = np.ones(self.values.shape, dtype=bool)
         self.instantaneous = values["vertical_accel"] == 0.0 or values["vertical_rate"] == 0.0
-        self._plan(values["vertical_accel"], values["vertical_rate"])
+        self._compute_flights(values["vertical_accel"], values["vertical_rate"])
         self.lookahead_s: float = values["lookahead_time"]
         #: Whether horizons count from time 0, not from the phases of a flight.
         self.from_now: bool = values["bands_add_time_to_maneuver"]
         # Where horizons count from now, level flights are asked for that begin beyond them.
-        self._merge_far_altitudes(math.inf if self.from_now else self.lookahead_s, step)
+        self._choose_examined_altitudes(math.inf if self.from_now else self.lookahead_s, step)
 
     def find_conflicts(self, intruder: State, detector: Detector) -> "AltitudeConflicts":
-        """Return when the flights meet a volume about one intruder of each, (n, 1)."""
+        """Return the conflicts of the flights to all altitudes with a volume around one intruder of
+        each ownship, given as a state of (n, 1).
+        """
         return AltitudeConflicts(self, intruder, detector)
 
-    def _plan(self, acceleration: float, rate: float) -> None:
-        """Find the times and rates of the flights to all altitudes."""
+    def _compute_flights(self, acceleration: float, rate: float) -> None:
+        """Compute and store the times and climb rates of the flights to all altitudes."""
         climb, gap = self.own.climb_mps, self.values - self.own.up_m
         if self.instantaneous:
             self.accelerated_s = self.held_s = self.level_s = np.zeros(gap.shape)
@@ -66,8 +68,8 @@ class Altitudes:
         self.level_s = self.held_s + peak / a
         self._rate, self._acceleration = up * peak, up * a
 
-    def _merge_far_altitudes(self, lookahead_s: float, step: float) -> None:
-        """Choose the altitudes whose flights differ within the lookahead.
+    def _choose_examined_altitudes(self, lookahead_s: float, step: float) -> None:
+        """Choose which altitudes to examine: those whose flights differ within the lookahead.
 
         Those whose climb is still held then are flown alike to either side, so one of them to each
         side stands for all.
@@ -91,15 +93,17 @@ class Altitudes:
         self._speed, self._push = chosen(self._rate), chosen(self._acceleration)
 
     def select_examined(self, of_each: FloatArray) -> FloatArray:
-        """Return values (n, k) of all altitudes for those that are looked at."""
+        """Return from values (n, k) of all altitudes those of the altitudes that are examined."""
         return np.take_along_axis(of_each, self._looked_at, axis=1)
 
     def spread_to_all(self, chosen: BoolArray) -> BoolArray:
-        """Return for all altitudes what holds for those that were looked at."""
+        """Return for all altitudes (n, k) the result of the examined one that stands for each."""
         return np.take_along_axis(chosen, self._stands_for, axis=1)
 
-    def flight_at(self, time_s: FloatArray) -> State:
-        """Return the straight flights at a time of each manoeuvre looked at, run back to 0."""
+    def straight_flight_from(self, time_s: FloatArray) -> State:
+        """Return straight flights by the position and velocity, at a time, of the flights to
+        examined altitudes, as states run back to time 0.
+        """
         own = self.own
         values = self._level_m
         if self.instantaneous:
@@ -121,7 +125,7 @@ class Altitudes:
 
 
 class AltitudeConflicts:
-    """When the flights to all altitudes meet a volume about one intruder of each ownship."""
+    """Times when flights to all altitudes are in a volume around each ownship's one intruder."""
 
     def __init__(self, altitudes: Altitudes, intruder: State, detector: Detector) -> None:
         self._altitudes, self._intruder, self._detector = altitudes, intruder, detector
@@ -138,59 +142,65 @@ class AltitudeConflicts:
             return
         self._held_s, self._held_until_s = np.maximum(t1, 0.0), np.minimum(t2, self._lookahead_s)
         self._held = self._straight_flight_span(self._held_s, False)
-        self._find_inside_at_seconds(np.zeros(t1.shape), t1)
-        self._find_inside_at_seconds(np.ceil(t2), t3 + 1.0)
+        self._store_inside_at_seconds(np.zeros(t1.shape), t1)
+        self._store_inside_at_seconds(np.ceil(t2), t3 + 1.0)
 
     def _straight_flight_span(self, begin_s: FloatArray, whole: bool) -> Span:
-        """Return when flights that are straight from some times on meet it, or would all along."""
+        """Return when straight flights, with the motion at ``begin_s``, are inside the volume: from
+        then on, or with ``whole`` from time 0 on.
+        """
         if whole:
-            flight, begin_s = self._altitudes.flight_at(begin_s), np.zeros(begin_s.shape)
+            flight, begin_s = self._altitudes.straight_flight_from(begin_s), np.zeros(begin_s.shape)
         else:
             begin_s = np.minimum(begin_s, self._lookahead_s)
-            flight = self._altitudes.flight_at(begin_s)
+            flight = self._altitudes.straight_flight_from(begin_s)
         # Beyond the lookahead, at whose end the volume may be asked for.
         return self._detector.span(flight, self._intruder, begin_s, self._lookahead_s + 1.0)
 
-    def _find_inside_at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
-        """Find which flights are inside at the whole seconds of an interval."""
+    def _store_inside_at_seconds(self, first_s: FloatArray, last_s: FloatArray) -> None:
+        """Store for each whole second of an interval which flights are inside the volume then."""
         last_s = np.floor(np.minimum(last_s, self._lookahead_s))
         # All flights of an acceleration share their first seconds, so these are few.
         for number in range(int(np.max(last_s - first_s, initial=-1.0)) + 1):
             time_s = first_s + number
             due = (time_s <= last_s) & (time_s < self._lookahead_s)
             if due.any():
-                flight = self._altitudes.flight_at(time_s)
+                flight = self._altitudes.straight_flight_from(time_s)
                 span = self._detector.span(flight, self._intruder, time_s, time_s + 1.0)
                 self._seconds.append((time_s, due & nearly_equal(span.begin_s, time_s)))
 
     def is_unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Return which altitude changes conflict within the horizon."""
-        end_s = np.minimum(self._conflicts_after(horizon_s, self._level_s), self._lookahead_s)
+        """Return a mask (n, k), True for altitudes whose flights conflict within the horizon."""
+        end_s = np.minimum(self._horizon_end_s(horizon_s, self._level_s), self._lookahead_s)
         begin_s = np.maximum(from_s, self._level_s)
-        met = meets(self._level, begin_s, end_s) | is_met_at(self._level, from_s, begin_s, end_s)
+        met = overlaps_time(self._level, begin_s, end_s) | contains_instant(
+            self._level, from_s, begin_s, end_s
+        )
         if not self._altitudes.instantaneous:
-            end_s = np.minimum(self._conflicts_after(horizon_s, self._held_s), self._held_until_s)
+            end_s = np.minimum(self._horizon_end_s(horizon_s, self._held_s), self._held_until_s)
             begin_s = np.maximum(from_s, self._held_s)
-            met |= meets(self._held, begin_s, end_s) | is_met_at(self._held, from_s, begin_s, end_s)
+            met |= overlaps_time(self._held, begin_s, end_s) | contains_instant(
+                self._held, from_s, begin_s, end_s
+            )
         last_s = horizon_s if self._from_now else np.inf
         for time_s, inside in self._seconds:
             met |= inside & (time_s >= from_s) & (time_s <= last_s)
         return self._altitudes.spread_to_all(met & np.asarray(from_s <= horizon_s))
 
-    def _conflicts_after(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
+    def _horizon_end_s(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
         return np.asarray(horizon_s if self._from_now else horizon_s + phase_s)
 
     has_conflict_soon = is_unsafe
 
     def has_conflict_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
-        """Return which altitude changes conflict before a time (n, 1)."""
+        """Return a mask (n, k), True for altitudes whose flights conflict before a time (n, 1)."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)
         late = (self._level_s > horizon_s) & self._from_now
         begin_s = np.where(late, 0.0, self._level_s)
-        met = meets(self._level, begin_s, np.where(late, horizon_s, until_s))
+        met = overlaps_time(self._level, begin_s, np.where(late, horizon_s, until_s))
         if not self._altitudes.instantaneous:
-            met |= meets(self._held, self._held_s, np.minimum(self._held_until_s, until_s))
+            met |= overlaps_time(self._held, self._held_s, np.minimum(self._held_until_s, until_s))
         for time_s, inside in self._seconds:
             met |= inside & (time_s <= until_s)
         return self._altitudes.spread_to_all(met)

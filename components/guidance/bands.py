@@ -20,8 +20,8 @@ from components.guidance.intervals import (
     paint_bands,
     rename_to_recovery,
 )
-from components.guidance.manoeuvre_kinds import ManoeuvreKind, kind_of
-from components.guidance.recovery import Recovery, recover, recovery_cylinder
+from components.guidance.manoeuvre_kinds import ManoeuvreKind, manoeuvres_of_kind
+from components.guidance.recovery import Recovery, find_recoveries, recovery_cylinder
 from components.guidance.regions import GuidedIntruders, Regions, intervals_of
 from components.guidance.situation import State
 from components.well_clear.detection import Bounds, select_bounds
@@ -29,7 +29,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class Resolution(NamedTuple):
-    """Where the red band around the own value ends."""
+    """The nearest values, to either side, outside the red band around the own value."""
 
     # The nearest values that are not red to either side: left and right, or down and up;
     # infinite where there is none
@@ -41,7 +41,7 @@ class Resolution(NamedTuple):
 def resolution(
     bands: list[Band], own_value: float, corrective_region: str, cyclic: bool
 ) -> Resolution | None:
-    """Return the way out of the red band that holds the own value, or None if it is in none.
+    """Return the nearest values outside the red band around the own value; None if in none.
 
     Parameters
     ----------
@@ -60,9 +60,9 @@ def resolution(
         # As near to north it lies in the first band, and no way to the left is found.
         if not red[0]:
             return None
-        low, high = -math.inf, _stretches(bands, red, (FULL_TURN,))[0][1]
+        low, high = -math.inf, _red_intervals(bands, red, (FULL_TURN,))[0][1]
     else:
-        for low, high in _stretches(bands, red, turns):
+        for low, high in _red_intervals(bands, red, turns):
             on_edge = is_same_value(low, own_value) or is_same_value(high, own_value)
             if low < own_value < high and not on_edge:
                 break
@@ -72,8 +72,8 @@ def resolution(
     low_end = -math.inf if is_same_value(low, first) else low
     high_end = math.inf if is_same_value(high, last) else high
     if cyclic:
-        low_end = _direction(own_value, low_end, -math.inf)
-        high_end = _direction(own_value, high_end, math.inf)
+        low_end = _edge_as_direction(own_value, low_end, -math.inf)
+        high_end = _edge_as_direction(own_value, high_end, math.inf)
     down, up = (
         distance_to_edge(own_value, low_end, cyclic),
         distance_to_edge(own_value, high_end, cyclic),
@@ -82,10 +82,10 @@ def resolution(
     return Resolution(low_end, high_end, bool(math.isfinite(high_end) and nearer))
 
 
-def _stretches(
+def _red_intervals(
     bands: list[Band], red: list[bool], turns: tuple[float, ...]
 ) -> list[tuple[float, float]]:
-    """Return from where to where bands are red without a gap, over some turns of a circle.
+    """Return the intervals in which bands are red without a gap, over some turns of a circle.
 
     Beyond north, places of a stretch are compared with a full turn added to them, where more
     doubles lie in the same distance.
@@ -111,8 +111,8 @@ def is_red(band: Band, least: int) -> bool:
     return band.region != "RECOVERY" and REGIONS.index(band.region) >= least
 
 
-def _direction(own_value: float, edge: float, none: float) -> float:
-    """Return an edge within [0, 2 pi), or `none` if it is half a turn away or more."""
+def _edge_as_direction(own_value: float, edge: float, none: float) -> float:
+    """Return an edge as a direction in [0, 2 pi); ``none`` if half a turn or more from the own."""
     way = abs(edge - own_value)
     if not math.isfinite(edge) or way >= math.pi or is_same_value(way, math.pi):
         return none
@@ -144,7 +144,7 @@ class Guidance(NamedTuple):
 
     @property
     def recovers(self) -> bool:
-        """Return whether free values are shown as RECOVERY bands."""
+        """Return whether there is a recovery, so that free values are shown as RECOVERY bands."""
         return self.recovery is not None and self.recovery.time_s >= 0.0
 
 
@@ -161,7 +161,7 @@ class GuidedIntruder:
 def guidance(
     kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruder]
 ) -> Guidance:
-    """Return the bands of one kind at one instant, without memory.
+    """Return bands of a kind (direction, speed, climb, altitude) at an instant, without memory.
 
     Parameters
     ----------
@@ -172,14 +172,14 @@ def guidance(
     """
     alone = [
         GuidedIntruders(
-            _only_state(i.state),
+            _single_row_state(i.state),
             i.alerter,
             np.array([i.early_level]),
             bounds=None if i.bounds is None else select_bounds(i.bounds, np.newaxis),
         )
         for i in intruders
     ]
-    return guidance_of_many(kind_name, configuration, _only_state(own), alone)[0]
+    return guidance_of_many(kind_name, configuration, _single_row_state(own), alone)[0]
 
 
 def guidance_of_many(
@@ -188,7 +188,7 @@ def guidance_of_many(
     own: State,
     intruders: Sequence[GuidedIntruders],
 ) -> list[Guidance]:
-    """Return the bands of one kind for many states of ownships, each by itself.
+    """Return the bands of one kind for the states of many ownships, each computed by itself.
 
     Parameters
     ----------
@@ -201,34 +201,36 @@ def guidance_of_many(
         several items.
     """
     made: list[Guidance] = []
-    for block in _parts(np.arange(len(own.up_m)), _MOST_AT_ONCE[kind_name] * _PARTS_AT_ONCE):
+    for block in _blocks_of_rows(
+        np.arange(len(own.up_m)), _MOST_AT_ONCE[kind_name] * _PARTS_AT_ONCE
+    ):
         parts = []
-        for rows in _parts(block, _MOST_AT_ONCE[kind_name]):
+        for rows in _blocks_of_rows(block, _MOST_AT_ONCE[kind_name]):
             theirs = [intruder.rows(rows) for intruder in intruders]
             parts.append(_Part(kind_name, configuration, own.rows(rows), theirs))
         # A search takes as many steps whatever it holds, so those of all parts are one.
         stuck = np.concatenate([part.saturated for part in parts])
         recoveries: list[tuple[Recovery, list[Interval]]] = []
         if configuration[f"recovery_{kind_name}"]:
-            for rows in _parts(block[stuck], _MOST_AT_ONCE[kind_name]):
+            for rows in _blocks_of_rows(block[stuck], _MOST_AT_ONCE[kind_name]):
                 theirs = [intruder.rows(rows) for intruder in intruders]
-                recoveries += recover(kind_name, configuration, own.rows(rows), theirs)
+                recoveries += find_recoveries(kind_name, configuration, own.rows(rows), theirs)
         ways = iter(recoveries)
         for part in parts:
             made += part.paint_bands(ways if recoveries else None)
     return made
 
 
-def _parts(rows: IntArray, most: int) -> list[IntArray]:
+def _blocks_of_rows(rows: IntArray, most: int) -> list[IntArray]:
     return [rows[start : start + most] for start in range(0, len(rows), most)]
 
 
-def _only_state(state: State) -> State:
+def _single_row_state(state: State) -> State:
     return State(*(np.asarray(part, dtype=np.float64).reshape(1) for part in state))
 
 
 class _Part:
-    """Some states, of whom it is known what is clear of the volumes, and who finds no way."""
+    """Some ownships, with the manoeuvres clear of the volumes, and which ownships have none."""
 
     def __init__(
         self,
@@ -237,16 +239,16 @@ class _Part:
         own: State,
         intruders: list[GuidedIntruders],
     ) -> None:
-        kind = kind_of(kind_name, own, configuration)
+        kind = manoeuvres_of_kind(kind_name, own, configuration)
         regions = Regions(configuration, kind, own, intruders)
         layers: list[tuple[str, BoolArray, BoolArray]] = []  # region, of whom, clear values
         on = np.ones(len(own.up_m), dtype=bool)
         self.saturated = np.zeros(len(on), dtype=bool)
         corrective = REGIONS.index(configuration["corrective_region"])
         for region in _PAINTED:
-            known, clear = regions.clear(region)
+            known, clear = regions.safe_values(region)
             layers.append((region, on & known, clear))
-            stuck = on & known & ~regions.leads(clear)
+            stuck = on & known & ~regions.has_clear_interval(clear)
             if REGIONS.index(region) >= corrective:
                 self.saturated |= stuck
             on = on & ~stuck
@@ -256,7 +258,7 @@ class _Part:
         self._painter = _Painter(configuration, kind, layers, own.up_m)
 
     def paint_bands(self, ways: Iterator[tuple[Recovery, list[Interval]]] | None) -> list[Guidance]:
-        """Return the bands, with the next of the `ways` of recovery for each that is saturated."""
+        """Return each row's guidance, with the next of ``ways`` where no manoeuvre is clear."""
         return [
             self._painter.guidance(row, next(ways) if stuck and ways else None, at_once)
             for row, (stuck, at_once) in enumerate(

@@ -8,7 +8,12 @@ import numpy as np
 from pydantic import Field, field_validator
 
 from components.alert_configuration.conf_file import read_conf
-from components.alert_configuration.configuration import Alerter, Configuration, Deviations, margins
+from components.alert_configuration.configuration import (
+    Alerter,
+    Configuration,
+    Deviations,
+    uncertainty_bounds,
+)
 from components.guidance.bands import Guidance, guidance_of_many, resolution
 from components.guidance.intervals import FULL_TURN, is_same_value
 from components.guidance.regions import GuidedIntruders
@@ -22,7 +27,7 @@ from components.messages.alerts import (
 )
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, Producer, ScenePath
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Wake
 
 
@@ -42,8 +47,8 @@ class ConfParameters(Parameters):
         read_conf(value)
         return value
 
-    def read(self) -> tuple[Configuration, Alerter]:
-        """Return the configuration and the alerter."""
+    def read_configuration(self) -> tuple[Configuration, Alerter]:
+        """Read the configuration's file; return the configuration and its chosen alerter."""
         configuration = read_conf(self.conf)
         count = len(configuration.alerters)
         if self.alerter > count:
@@ -68,7 +73,7 @@ def changes_out_of_bands(
     alerts: AlertLevels,
     rows: Sequence[int],
 ) -> list[Changes | None]:
-    """Return the smallest changes to either side that lead out of the bands at some instants.
+    """Return each row's smallest changes left or down, and right or up, that leave the bands.
 
     They are to the left or down, negative, and to the right or up, positive, in rad, m/s or m;
     infinite where nothing there leads out, and None where the own value needs no change or is not
@@ -89,7 +94,7 @@ def bands_around(
     alerts: AlertLevels,
     rows: Sequence[int],
 ) -> list[Guidance | None]:
-    """Return the bands at some instants, each by itself; None where nothing is known yet.
+    """Return the bands at given rows of alerts, without memory; None if own motion is unknown.
 
     Parameters are those of `changes_out_of_bands`.
     """
@@ -103,7 +108,8 @@ def bands_around(
         zero = np.zeros(len(alike))
         state = State(zero, zero, *own[:, alike])
         intruders = [
-            _intruder(alerts, first[alike] + i, state, configuration, alerter) for i in range(count)
+            _intruders_of_entries(alerts, first[alike] + i, state, configuration, alerter)
+            for i in range(count)
         ]
         every = guidance_of_many(kind_name, configuration, state, intruders)
         for index, guided in zip(alike.tolist(), every, strict=True):
@@ -111,19 +117,19 @@ def bands_around(
     return result
 
 
-def _intruder(
+def _intruders_of_entries(
     alerts: AlertLevels,
     entries: IntArray,
     own: State,
     configuration: Configuration,
     alerter: Alerter,
 ) -> GuidedIntruders:
-    """Return one intruder of each of some ownships."""
+    """Return the intruders of some alert entries, one per ownship, with bounds on their errors."""
     parts = [alerts.relative[name][entries] for name in _RELATIVE]
     bounds = None
     if alerts.deviations:
         wrong = Deviations(*(alerts.deviations[name][entries] for name in Deviations._fields))
-        bounds = margins(configuration, wrong, np.hypot(parts[0], parts[1]))
+        bounds = uncertainty_bounds(configuration, wrong, np.hypot(parts[0], parts[1]))
     state = State(*(mine - part for mine, part in zip(own, parts, strict=True)))
     early = np.zeros(len(entries), dtype=np.int64)
     return GuidedIntruders(state, alerter, early, bounds=bounds)
@@ -140,8 +146,8 @@ def _changes(guided: Guidance, region: str, cyclic: bool) -> Changes | None:
     return low, high
 
 
-def smaller(changes: tuple[float, float]) -> float | None:
-    """Return the smaller of two changes, to the right or up where they are equal.
+def smaller_change(changes: tuple[float, float]) -> float | None:
+    """Return the change of smaller size, that to the right or up if both are equal.
 
     None where there is neither.
     """
@@ -153,7 +159,7 @@ def smaller(changes: tuple[float, float]) -> float | None:
 def explain_no_steering(
     level: int, configuration: Configuration, alerter: Alerter, producers: Sequence[Producer]
 ) -> list[str]:
-    """Explain where no alert reaches the level at which a block steers, or no band is red."""
+    """Return notes if no alert can reach a block's steering level, or no band can be red."""
     said = note_unreached_level("level", level, producers)
     if configuration.corrective_level(alerter) is None:
         said.append(
@@ -199,7 +205,7 @@ class DaidalusGuidance(Component):
 
     def setup(self) -> None:
         """Read the configuration."""
-        self._configuration, self._alerter = self.p.read()
+        self._configuration, self._alerter = self.p.read_configuration()
 
     def warnings(self) -> list[str]:
         """Return a warning where no alert reaches its level, or no level has bands."""
@@ -213,7 +219,7 @@ class DaidalusGuidance(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        rows = np.flatnonzero(alerts.highest() >= self.p.level).tolist()
+        rows = np.flatnonzero(alerts.highest_levels() >= self.p.level).tolist()
         result: list[tuple[int, int, int, float, float]] = []
         for number, kind in enumerate(BAND_KINDS):
             if kind not in self.p.kinds:
@@ -237,5 +243,5 @@ class DaidalusGuidance(Component):
         ]
         region = table[:, 2].astype(np.int64)
         ran = wake.instants.take(np.array(rows, dtype=np.int64))
-        offsets = offsets_of(line, len(rows))
+        offsets = offsets_from_entry_rows(line, len(rows))
         return GuidanceBands(ran.tick, offsets, code, region, *ends, run=ran.run)

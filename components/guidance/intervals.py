@@ -41,7 +41,9 @@ def is_same_value(one: float, other: float) -> bool:
 
 
 def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the least and most values of a kind, also relative to the own value where set."""
+    """Return the least and the largest value of one kind of manoeuvre, within what the
+    configuration allows around the own value.
+    """
     below, above = values[f"below_relative_{name}"], values[f"above_relative_{name}"]
     least = np.full(np.shape(own_value), float(values[f"min_{name}"]))
     most = np.full(np.shape(own_value), float(values[f"max_{name}"]))
@@ -55,7 +57,7 @@ def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray
 def clear_intervals(
     values: FloatArray, clear: BoolArray, least: float, most: float, cyclic: bool
 ) -> list[Interval]:
-    """Return the intervals of values that are clear, within the limits."""
+    """Return intervals of neighbouring clear values, within limits or, if cyclic, [0, 2 pi]."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], clear.astype(int), [0]])))
     result = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
@@ -68,7 +70,7 @@ def clear_intervals(
 
 
 def _wrap_interval(interval: Interval) -> list[Interval]:
-    """Return an interval of directions within [0, 2 pi], in two where it holds 0."""
+    """Return an interval of directions within [0, 2 pi], split in two where it contains north."""
     if interval.high - interval.low >= FULL_TURN or is_same_value(
         interval.high - interval.low, FULL_TURN
     ):

@@ -12,12 +12,12 @@ import numpy as np
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.guidance.altitudes import AltitudeConflicts, Altitudes
 from components.guidance.intervals import FULL_TURN, limits_of
-from components.guidance.situation import Detector, State, is_met_at, meets
+from components.guidance.situation import Detector, State, contains_instant, overlaps_time
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
 class Steps(NamedTuple):
-    """Manoeuvres of n ownships from the leftmost or lowest to the rightmost or highest.
+    """The manoeuvres that n ownships may fly, from leftmost or lowest to rightmost or highest.
 
     `number` (k,) is the signed number of steps from the own value, ascending; 0 is no manoeuvre.
     """
@@ -41,12 +41,14 @@ class Steps(NamedTuple):
         return not self.step_time_s.any()
 
     def find_conflicts(self, intruder: State, detector: Detector) -> "StepConflicts":
-        """Return when the manoeuvres meet a volume about one intruder of each, (n, 1)."""
+        """Return the conflicts of the manoeuvres with a volume around one intruder of each ownship,
+        given as a state of (n, 1).
+        """
         return StepConflicts(self, intruder, detector)
 
 
 def _direction_steps(own: State, values: Any) -> Steps:
-    """Return turns by multiples of a step to the left and right."""
+    """Return the turns of each ownship to the left and right by multiples of a step."""
     step = values["step_hdir"]
     own_value = np.arctan2(own.east_mps, own.north_mps) % FULL_TURN
     own = own.columns()
@@ -56,7 +58,7 @@ def _direction_steps(own: State, values: Any) -> Steps:
     rate = np.full((1, 1), float(values["turn_rate"]))
     if values["turn_rate"] == 0.0 and values["bank_angle"] > 0.0:
         rate = STANDARD_GRAVITY_M_S2 * math.tan(values["bank_angle"]) / speed
-    left, right = (_turns(values[key], step) for key in ("left_hdir", "right_hdir"))
+    left, right = (_turn_step_count(values[key], step) for key in ("left_hdir", "right_hdir"))
     number = np.arange(-left, right + 1)
     track = np.arctan2(own.east_mps, own.north_mps)
     turned = track + number * step
@@ -80,7 +82,7 @@ def _direction_steps(own: State, values: Any) -> Steps:
     )  # fmt: skip
 
 
-def _turns(most_rad: float, step: float) -> int:
+def _turn_step_count(most_rad: float, step: float) -> int:
     count = math.ceil(most_rad / step)
     return count - 1 if count * step > math.pi else count
 
@@ -122,7 +124,7 @@ def _speed_steps(name: str, own: State, values: Any) -> Steps:
 
 
 class StepConflicts:
-    """When the flights after all steps meet a volume about one intruder of each ownship.
+    """Times when flights after all steps are in a volume around each ownship's one intruder.
 
     The times are computed once, over all that may be asked; every question only cuts them.
     """
@@ -139,18 +141,20 @@ class StepConflicts:
         self._span = detector.span(steps.flight, intruder, begin_s, end_s)
         if not steps.instantaneous:
             lasts_s = steps.time_s + steps.step_time_s
-            self._while_flown = meets(self._span, steps.time_s, lasts_s) & steps.there
+            self._while_flown = overlaps_time(self._span, steps.time_s, lasts_s) & steps.there
 
     def has_conflict_soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Return which steps lead to a conflict after the manoeuvre."""
+        """Return a mask (n, k), True for steps whose flight conflicts within the horizon after."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
         end_s = np.minimum(self._lookahead_s, horizon_s + self._after_s)
-        met = meets(self._span, begin_s, end_s) | is_met_at(self._span, from_s, begin_s, end_s)
+        met = overlaps_time(self._span, begin_s, end_s) | contains_instant(
+            self._span, from_s, begin_s, end_s
+        )
         return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
     def is_unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
-        """Return which steps conflict, or lie beyond one that does while it is flown."""
+        """Return a mask (n, k), True for steps in conflict or reached only through a conflict."""
         met = self.has_conflict_soon(from_s, horizon_s)
         if self._steps.instantaneous:
             return met
@@ -161,22 +165,22 @@ class StepConflicts:
         last = np.floor(last_s / self._steps.step_time_s)
         due = (self._count >= first) & (self._count <= last)
         due = due & (self._steps.time_s < self._lookahead_s) & np.asarray(from_s <= horizon_s)
-        return met | self._conflicts_beyond(self._while_flown & due)
+        return met | self._spread_conflicts_outwards(self._while_flown & due)
 
     def has_conflict_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
-        """Return which steps conflict before a time (n, 1), flown until then."""
+        """Return a mask (n, k), True for steps that conflict before a time (n, 1)."""
         horizon_s = np.minimum(horizon_s, self._lookahead_s)
         until_s = np.minimum(until_s, horizon_s)
         late = (self._steps.time_s > horizon_s) & self._steps.from_now
         begin_s = np.where(late, 0.0, self._steps.time_s)
-        met = meets(self._span, begin_s, np.where(late, horizon_s, until_s))
+        met = overlaps_time(self._span, begin_s, np.where(late, horizon_s, until_s))
         met &= self._steps.there
         if not self._steps.instantaneous:
             early = self._count <= np.floor(until_s / self._steps.step_time_s)
-            met |= self._conflicts_beyond(self._while_flown & early)
+            met |= self._spread_conflicts_outwards(self._while_flown & early)
         return met
 
-    def _conflicts_beyond(self, met: BoolArray) -> BoolArray:
+    def _spread_conflicts_outwards(self, met: BoolArray) -> BoolArray:
         if not met.any():
             return met
         # Outwards to either side, from no manoeuvre on.
@@ -196,8 +200,8 @@ ManoeuvreKind = Steps | Altitudes
 Conflicts = StepConflicts | AltitudeConflicts
 
 
-def kind_of(name: str, own: State, values: Any) -> ManoeuvreKind:
-    """Return the manoeuvres of one of `KINDS` for n ownships, by the values of a configuration."""
+def manoeuvres_of_kind(name: str, own: State, values: Any) -> ManoeuvreKind:
+    """Return the manoeuvres of one of `KINDS` for n ownships, by a configuration's values."""
     if name == "alt":
         return Altitudes(own, values)
     return _direction_steps(own, values) if name == "hdir" else _speed_steps(name, own, values)

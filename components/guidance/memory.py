@@ -20,7 +20,7 @@ _SEVERE = ("FAR", "MID", "NEAR")
 
 
 class BandMemory:
-    """The memory of one kind of bands of one ownship, by the values of a configuration."""
+    """Remembers one ownship's bands of one kind, so that they do not change at every instant."""
 
     def __init__(self, values: Any, cyclic: bool) -> None:
         self._hysteresis_s: float = values["hysteresis_time"]
@@ -62,7 +62,7 @@ class BandMemory:
         return bands
 
     def _filter_colours(self, line: list[Band]) -> list[Band]:
-        """Return the line in which each colour is the m-th largest of its place's last n.
+        """Return the line of bands with, at each place, the m-th worst colour of its last n.
 
         Each place of the line and of the memory stays one, also where the colour does not change.
         """
@@ -75,7 +75,8 @@ class BandMemory:
         if not self._places:
             self._places = list(places)
             self._queues = [
-                (self._first(a), self._first(b)) for a, b in zip(left, right, strict=True)
+                (self._initial_queue(a), self._initial_queue(b))
+                for a, b in zip(left, right, strict=True)
             ]
         self._split_at_common_places(places, left, right)
         result: list[int] = []
@@ -96,13 +97,13 @@ class BandMemory:
         self._queues = [self._queues[i] for i in kept]
         return made
 
-    def _first(self, colour: int) -> list[int]:
+    def _initial_queue(self, colour: int) -> list[int]:
         return [colour] * self._m + [_OUTSIDE] * (self._n - self._m)
 
     def _split_at_common_places(
         self, places: list[float], left: list[int], right: list[int]
     ) -> None:
-        """Split bands of line and memory at common places, so that they match one for one."""
+        """Split new and remembered bands at each other's edges, in place, to match one for one."""
         at = 0
         while at < max(len(places), len(self._places)):
             mine = self._places[at] if at < len(self._places) else math.inf
@@ -119,7 +120,7 @@ class BandMemory:
             at += 1
 
     def _paint_remembered(self, now_s: float, line: list[Band], own_value: float) -> list[Band]:
-        """Return the line with the remembered band painted over milder ones while it is young."""
+        """Return the line, with the remembered band painted over milder ones while recent."""
         held = self._held
         if held is None:
             self._risen_s = now_s
@@ -133,7 +134,7 @@ class BandMemory:
         return line
 
     def _remember(self, bands: list[Band], own_value: float) -> None:
-        at = band_at(bands, own_value)
+        at = band_index_at(bands, own_value)
         self._held = None
         if bands[at].region not in _SEVERE:
             return
@@ -145,8 +146,8 @@ class BandMemory:
             self._held = Band(last.low, first.high + FULL_TURN, first.region)
 
 
-def band_at(bands: list[Band], value: float) -> int:
-    """Return the band that holds a value: of two that meet there, the free or milder one."""
+def band_index_at(bands: list[Band], value: float) -> int:
+    """Return the index of a value's band; where two meet, that of the free or milder one."""
     holding = [
         i
         for i, band in enumerate(bands)
@@ -165,7 +166,7 @@ def band_at(bands: list[Band], value: float) -> int:
 
 
 def _region_at(bands: list[Band], value: float) -> str:
-    return bands[band_at(bands, value)].region
+    return bands[band_index_at(bands, value)].region
 
 
 def _paint_over(line: list[Band], held: Band, remembered: int) -> list[Band]:
@@ -250,7 +251,7 @@ class ResolutionMemory:
     def _keeps(
         self, side: int, raw: float, bands: list[Band], own_value: float, holds: bool
     ) -> bool:
-        """Return whether the shown resolution stays; `holds` keeps it however far it is."""
+        """Return whether a side's shown resolution stays; with ``holds`` however far the new is."""
         old = self._shown[side]
         if not (math.isfinite(old) and math.isfinite(raw)):
             return False
@@ -259,15 +260,17 @@ class ResolutionMemory:
             return False
         if not holds and not _is_surely_below(self._distance_outward(side, raw, old), self._near):
             return False
-        return self._leads(self._band_of(side, raw, bands), band_at(bands, old), bands)
+        return self._is_connected_without_red(
+            self._free_band_index_at(side, raw, bands), band_index_at(bands, old), bands
+        )
 
     def _distance_outward(self, side: int, start: float, end: float) -> float:
-        """Return how far it is from one value to another, to a side."""
+        """Return the distance from one value to another, counted towards a side."""
         way = end - start if side == _HIGH else start - end
         return way % FULL_TURN if self._cyclic else way
 
-    def _band_of(self, side: int, edge: float, bands: list[Band]) -> int:
-        """Return which band that is not red begins above an edge, or ends below it."""
+    def _free_band_index_at(self, side: int, edge: float, bands: list[Band]) -> int:
+        """Return the index of the band, not red, that begins (lower side: ends) there, or -1."""
         if self._cyclic and (is_same_value(edge, 0.0) or is_same_value(edge, FULL_TURN)):
             return 0 if side == _HIGH else len(bands) - 1
         free = [i for i, band in enumerate(bands) if not is_red(band, self._least_red)]
@@ -275,8 +278,10 @@ class ResolutionMemory:
             return next((i for i in free if is_same_value(bands[i].low, edge)), -1)
         return next((i for i in reversed(free) if is_same_value(bands[i].high, edge)), -1)
 
-    def _leads(self, start: int, end: int, bands: list[Band]) -> bool:
-        """Return whether bands lead to another one on the preferred side without a red one."""
+    def _is_connected_without_red(self, start: int, end: int, bands: list[Band]) -> bool:
+        """Return whether one band can be reached from another on the preferred side without
+        crossing a red one.
+        """
         if start < 0:
             return False
         at = start
@@ -322,7 +327,7 @@ def _is_surely_below(one: float, other: float) -> bool:
 
 
 class Remembered(NamedTuple):
-    """The bands of one kind at one instant, and the way out of them."""
+    """One kind's bands at one instant after memory, and the resolution that leads out of them."""
 
     bands: list[Band]
     resolution: Resolution | None
@@ -341,7 +346,7 @@ class GuidanceMemory:
         self._resolutions = ResolutionMemory(configuration, kind_name)
 
     def step(self, now_s: float, guided: Guidance) -> Remembered:
-        """Update the memory with the guidance of one instant, and return what is shown."""
+        """Update the memory with one instant's guidance; return bands and resolution to show."""
         own_value, recovery = guided.own_value, guided.recovery
         bands = self._bands.step(now_s, guided.line, own_value, recovery)
         way = resolution(bands, own_value, self._corrective, self._cyclic)

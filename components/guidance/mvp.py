@@ -6,17 +6,23 @@ import numpy as np
 from pydantic import Field
 
 from components.geometry import enu_to_geodetic, find_plane_scale, line_of_sight_ned
-from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
+from components.guidance.potential import (
+    KeptApart,
+    Others,
+    conflict_mask,
+    may_resume,
+    push_velocity,
+)
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
 from components.messages.state_tracks import STALE_S
 from components.messages.steering import Velocities
 from components.messages.targets import TrafficStates
-from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
+from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 
 # Within this of its goal an aircraft stays; it flies to it no faster than in a second.
 _AT_GOAL_M, _LAST_S = 0.5, 1.0
@@ -45,7 +51,7 @@ class PotentialParameters(Parameters):
     )  # fmt: skip
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence where the own speed is above the largest, at which it is flown."""
+        """Return a note if ``speed_mps`` is above ``most_mps``, to which all speeds are limited."""
         said = super().ineffective_key_notes()
         if self.speed_mps <= self.most_mps:
             return said
@@ -77,11 +83,11 @@ class VoltagePotential(Component):
 
     @classmethod
     def may_climb(cls, parameters: PotentialParameters) -> bool:
-        """Return that it never commands another altitude."""
+        """Return False: this block never commands a change of altitude."""
         return False
 
     def request(self, port: str) -> FarthestLook | None:
-        """Return a request for no targets in the states: only the own position is read."""
+        """Return a request for no targets, as only the ownship's position is read from states."""
         return FarthestLook(0.0) if port == "states" else None
 
     def setup(self) -> None:
@@ -95,7 +101,7 @@ class VoltagePotential(Component):
         self._unmoved = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often it could not steer."""
+        """Return how many tracks near no target were ignored, and own velocities not known."""
         return {"its own velocity is not known yet and it does not steer": self._unmoved}
 
     def run(self, wake: Wake) -> Velocities | None:
@@ -104,15 +110,15 @@ class VoltagePotential(Component):
         if alerts is None or states is None:
             return None
         self._make_room(alerts)
-        others, own_mps, heard = _dense(alerts, self._contacts)
+        others, own_mps, heard = _others_by_target(alerts, self._contacts)
         if alerts.in_plane:
             # Else a velocity that is held would be another one at every instant.
             own_mps *= find_plane_scale(states.own_lat_deg, states.own_alt_m)
         some, still = heard.any(axis=1), np.isnan(own_mps[0])
-        self._unmoved = count_cases(self._unmoved, wake.run[some & still], wake.run[some])
+        self._unmoved = add_cases(self._unmoved, wake.run[some & still], wake.run[some])
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
-        for turn in occurrences_by_turn(wake.run):
+        for turn in indices_by_occurrence(wake.run):
             # Of most wakes all rows are of one turn, which need not be picked.
             rows = slice(None) if len(turn) == len(wake) else turn
             run = wake.run[rows]
@@ -128,10 +134,10 @@ class VoltagePotential(Component):
             if self.p.goal_m is not None and len(self._known.rows_of_runs(run)) < len(run):
                 unknown = np.flatnonzero(~np.isin(run, self._known.replica))
                 new.goal[:, unknown] = self._goal_positions(new.goal[:, unknown], yaw[unknown])
-            known = self._known.latest_or_new(new) if len(self._known) else new
+            known = self._known.kept_rows_or_new(new) if len(self._known) else new
             seen = Others(*(part[:, rows] for part in others))
             own = own_mps[:, rows]
-            now = conflicts(seen, self._kept) & heard[rows]
+            now = conflict_mask(seen, self._kept) & heard[rows]
             done = may_resume(seen, own, self._kept) | ~np.isfinite(own[0])[:, np.newaxis]
             active = now | (known.active.T & ~(done & heard[rows]))
             unheard_s = new.unheard_s
@@ -155,14 +161,14 @@ class VoltagePotential(Component):
                 active=active.T.copy(), unheard_s=unheard_s, last_mps=velocity
             )
             self._known = self._known.replace_runs(run, newer, wake.first_run)
-        return self._velocities(wake, commanded)
+        return self._velocity_commands(wake, commanded)
 
     def _make_room(self, alerts: AlertLevels) -> None:
         """Let contacts be those of alerts, and tracks that are active; targets are always all."""
         contacts = np.arange(len(alerts.roster))
         if alerts.numbers:
             active = self._known.active.any(axis=1) if len(self._known) else []
-            contacts = np.union1d(self._contacts[active], alerts.contacts())
+            contacts = np.union1d(self._contacts[active], alerts.contact_numbers())
         if len(self._known) and not np.array_equal(contacts, self._contacts):
             _, new, old = np.intersect1d(contacts, self._contacts, True, return_indices=True)
             shape = len(contacts), len(self._known)
@@ -172,7 +178,7 @@ class VoltagePotential(Component):
         self._contacts = contacts
 
     def _undisturbed_velocity(self, known: KeyedTable, place: FloatArray) -> FloatArray:
-        """Return the velocity (2, n) to fly without a conflict."""
+        """Return the conflict-free velocity (2, n) east, north (m/s): to the goal or on track."""
         if self.p.goal_m is None:
             return self.p.speed_mps * np.stack([np.sin(known.track), np.cos(known.track)])
         north, east, _ = line_of_sight_ned(*place, *known.goal, validate=False)
@@ -183,7 +189,7 @@ class VoltagePotential(Component):
         return np.stack([east * per_m, north * per_m])
 
     def _goal_positions(self, place: FloatArray, yaw: FloatArray) -> FloatArray:
-        """Return latitudes, longitudes and altitudes (3, n) of goals ahead of places."""
+        """Return goals' latitude, longitude, altitude (3, n), ``goal_m`` straight ahead."""
         goal_m = self.p.goal_m or 0.0
         return np.stack(
             enu_to_geodetic(
@@ -194,11 +200,11 @@ class VoltagePotential(Component):
         )  # fmt: skip
 
     def _limit_speed(self, velocity: FloatArray) -> FloatArray:
-        """Return velocities no larger than the largest."""
+        """Return velocities reduced where they are faster than ``most_mps``."""
         speed_mps = np.hypot(*velocity)
         return np.asarray(velocity * np.minimum(1.0, self.p.most_mps / np.maximum(speed_mps, 1e-9)))
 
-    def _velocities(self, wake: Wake, commanded: FloatArray) -> Velocities | None:
+    def _velocity_commands(self, wake: Wake, commanded: FloatArray) -> Velocities | None:
         rows = np.flatnonzero(np.isfinite(commanded[0]))
         if not len(rows):
             return None
@@ -210,14 +216,17 @@ class VoltagePotential(Component):
         )  # fmt: skip
 
 
-def _dense(alerts: AlertLevels, contacts: IntArray) -> tuple[Others, FloatArray, BoolArray]:
-    """Return states of contacts at each row, NaN where unknown, own velocities, and who is known.
+def _others_by_target(
+    alerts: AlertLevels, contacts: IntArray
+) -> tuple[Others, FloatArray, BoolArray]:
+    """Return by row the relative positions and velocities of all others, NaN where unknown, the own
+    velocities, and a mask of the others known.
 
     Positions in alerts are the ownship's less the target's.
     """
     shape, place = (len(alerts), len(contacts)), alerts.target
     if alerts.numbers:
-        place = np.searchsorted(contacts, alerts.contacts())
+        place = np.searchsorted(contacts, alerts.contact_numbers())
     own = np.array([alerts.own_motion[name] for name in ("east_mps", "north_mps")])
     names = ("east_m", "north_m"), ("east_mps", "north_mps")
     if len(place) == math.prod(shape) and (place.reshape(shape) == np.arange(shape[1])).all():

@@ -31,18 +31,18 @@ class Others(NamedTuple):
     velocity_mps: FloatArray
 
 
-def closest(others: Others) -> tuple[FloatArray, FloatArray]:
-    """Return when others are closest, s, and where they are then, m (2, n, others)."""
+def closest_times_and_positions(others: Others) -> tuple[FloatArray, FloatArray]:
+    """Return when (s) others are closest, and their relative positions (m) then, (2, n, others)."""
     (east, north), (east_mps, north_mps) = others
     closing = -(east * east_mps + north * north_mps)
     time_s = closing / np.maximum(_squared(others.velocity_mps), _LEAST_SPEED2)
     return time_s, others.position_m + others.velocity_mps * time_s
 
 
-def conflicts(others: Others, kept: KeptApart) -> BoolArray:
-    """Return which others come within the radius in time, (n, others); NaN never does."""
+def conflict_mask(others: Others, kept: KeptApart) -> BoolArray:
+    """Return a mask (n, others), True if within the radius before lookahead ends, not if NaN."""
     speed2 = _squared(others.velocity_mps)
-    time_s, miss = closest(others)
+    time_s, miss = closest_times_and_positions(others)
     inside2 = kept.radius_m**2 - _squared(miss)
     half_s = np.sqrt(np.maximum(inside2, 0.0) / np.maximum(speed2, _LEAST_SPEED2))
     meets = (inside2 > 0.0) & (time_s - half_s < kept.lookahead_s) & (time_s + half_s > 0.0)
@@ -50,7 +50,8 @@ def conflicts(others: Others, kept: KeptApart) -> BoolArray:
 
 
 def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArray:
-    """Return which others are past, apart, and not beside one on nearly one's own track.
+    """Return a mask (n, others), True for others that move away, outside the radius, and not close
+    by on nearly one's own track.
 
     `own_mps` is one's own velocity (2, n).
     """
@@ -69,7 +70,7 @@ def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArra
 def push_velocity(
     others: Others, own_mps: FloatArray, pushing: BoolArray, kept: KeptApart
 ) -> FloatArray:
-    """Return the velocity (2, n) that some others push one's own to.
+    """Return the velocity (2, n) to which the pushing others change one's own.
 
     Notes
     -----
@@ -81,7 +82,7 @@ def push_velocity(
     row, column = pushing.nonzero()
     others = Others(*(part[:, row, column] for part in others))
     radius_m = kept.margin * kept.radius_m
-    time_s, miss = closest(others)
+    time_s, miss = closest_times_and_positions(others)
     range_m, miss_m = np.hypot(*others.position_m), np.hypot(*miss)
     through = miss_m <= _LEAST_MISS_M
     east, north = others.position_m

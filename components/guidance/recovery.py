@@ -8,7 +8,7 @@ import numpy as np
 
 from components.alert_configuration.configuration import Configuration
 from components.guidance.intervals import Interval
-from components.guidance.manoeuvre_kinds import Conflicts, kind_of
+from components.guidance.manoeuvre_kinds import Conflicts, manoeuvres_of_kind
 from components.guidance.regions import GuidedIntruders, Regions, has_interval, intervals_of
 from components.guidance.situation import Detector, State
 from components.well_clear.tcas import recovery_sizes_m
@@ -19,7 +19,7 @@ _SEARCHED_S = 0.5
 
 
 class Recovery(NamedTuple):
-    """How a violation that cannot be avoided is left."""
+    """When a violation no longer avoidable is left, and the cylinder that is clear until then."""
 
     # From when on the volume is clear; minus infinity where nothing avoids a collision
     time_s: float
@@ -28,10 +28,10 @@ class Recovery(NamedTuple):
     shrinks: int  # How often the cylinder was made smaller
 
 
-def recover(
+def find_recoveries(
     kind_name: str, configuration: Configuration, own: State, intruders: list[GuidedIntruders]
 ) -> list[tuple[Recovery, list[Interval]]]:
-    """Return the earliest recovery of each of r ownships, and the values that lead to it."""
+    """Return each of r ownships' earliest recovery, and the intervals of values leading to it."""
     return _Search(kind_name, configuration, own, intruders).run()
 
 
@@ -39,7 +39,7 @@ Sizes = tuple[FloatArray, FloatArray]
 
 
 def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> Sizes:
-    """Return radius and half height that recovery keeps clear, before they are made smaller.
+    """Return the radius and half height (m) of recovery's cylinder, before it is made smaller.
 
     Where the configuration has 0, those of the resolution advisories of TCAS II count.
     """
@@ -75,7 +75,7 @@ class _Search:
         if configuration["daidalus_version"] == "2.0.1":
             last = (one.alerter.levels[-1].early_alerting_time_s for one in intruders)
             self._latest_s = min(last, default=math.inf)
-        self._kind = kind_of(kind_name, own, configuration)
+        self._kind = manoeuvres_of_kind(kind_name, own, configuration)
         self._intruders = intruders
         self._sizes = recovery_cylinder(configuration, own.up_m)
         regions = Regions(configuration, self._kind, own, intruders)
@@ -105,20 +105,20 @@ class _Search:
                 result[row] = Recovery(-math.inf, _sizes_of_row(sizes, row), int(shrinks[row])), []
             return rows[~ends]
 
-        self._try(np.repeat(nmac, count).reshape(2, count))
-        on = self._leads(self._clear_of_cylinder())
+        self._set_cylinders(np.repeat(nmac, count).reshape(2, count))
+        on = self._has_clear_interval(self._clear_of_cylinder())
         for row in np.flatnonzero(~on).tolist():
             result[row] = Recovery(-math.inf, nmac, 0), []
         todo = np.flatnonzero(on)
         while len(todo):
-            rows = self._rows_with_a_way(todo, sizes, smaller)
+            rows = self._rows_with_recovery(todo, sizes, smaller)
             if not len(rows):
                 break
             part = self._select_rows(rows)
-            part._try(sizes[:, rows])
-            time_s = part._earliest()
+            part._set_cylinders(sizes[:, rows])
+            time_s = part._earliest_recovery_s()
             clear = part._is_clear_until(time_s[:, np.newaxis])
-            found = part._leads(clear) & (time_s <= self._latest_s)
+            found = part._has_clear_interval(clear) & (time_s <= self._latest_s)
             for index in np.flatnonzero(found).tolist():
                 row = int(rows[index])
                 recovery = Recovery(
@@ -128,42 +128,42 @@ class _Search:
             todo = smaller(rows[~found])
         return [one for one in result if one is not None]
 
-    def _rows_with_a_way(
+    def _rows_with_recovery(
         self, rows: IntArray, sizes: FloatArray, smaller: Callable[[IntArray], IntArray]
     ) -> IntArray:
-        """Return the rows whose cylinders leave a way, each as small as it takes."""
+        """Return rows in which some values clear the cylinder, each made as small as that takes."""
         led: list[IntArray] = []
         search, on = self._select_rows(rows), np.ones(len(rows), dtype=bool)
         while on.any():
             if 2 * np.count_nonzero(on) <= len(on):  # what has ended for most is left behind
                 rows = rows[on]
                 search, on = self._select_rows(rows), on[on]
-            search._try(sizes[:, rows])
-            leads = on & search._leads(search._clear_of_cylinder())
+            search._set_cylinders(sizes[:, rows])
+            leads = on & search._has_clear_interval(search._clear_of_cylinder())
             led.append(rows[leads])
             on = np.isin(rows, smaller(rows[on & ~leads]))
         return np.sort(np.concatenate([*led, np.empty(0, dtype=np.int64)]))
 
     def _select_rows(self, rows: IntArray) -> "_Search":
-        """Return the search of some rows, ascending: this one of all."""
+        """Return the search for the given ascending rows; this one itself if they are all."""
         if len(rows) == len(self._kind.own_value):
             return self
         intruders = [intruder.rows(rows) for intruder in self._intruders]
         return _Search(self._kind_name, self._configuration, self._own.rows(rows), intruders)
 
-    def _try(self, sizes: Sizes | FloatArray) -> None:
-        """Look at cylinders of sizes (r,)."""
+    def _set_cylinders(self, sizes: Sizes | FloatArray) -> None:
+        """Compute and store the conflicts with cylinders of the given sizes (r,)."""
         detector = Detector(cylinder_m=(sizes[0][:, np.newaxis], sizes[1][:, np.newaxis]))
         self._cylinders = [
             self._kind.find_conflicts(self._intruders[one.intruder].state.columns(), detector)
             for one in self._concerned
         ]
 
-    def _leads(self, clear: BoolArray) -> BoolArray:
+    def _has_clear_interval(self, clear: BoolArray) -> BoolArray:
         return has_interval(self._kind, clear)
 
     def _clear_of_cylinder(self) -> BoolArray:
-        """Return which values keep clear of the cylinder alone."""
+        """Return a mask (r, k), True for values clear of the cylinder, whatever the volumes."""
         clear = self._kind.there.copy()
         for one, cylinder in zip(self._concerned, self._cylinders, strict=True):
             unsafe = cylinder.is_unsafe(0.0, one.horizon_s)
@@ -171,7 +171,7 @@ class _Search:
         return clear
 
     def _is_clear_until(self, time_s: FloatArray) -> BoolArray:
-        """Return which values keep clear of the cylinder until a time (r, 1), and of all after.
+        """Return a mask (r, k), True if clear of the cylinder to a time (r, 1), then of volumes.
 
         Beyond the horizon of an intruder only the cylinder counts, as far as that horizon.
         """
@@ -186,14 +186,14 @@ class _Search:
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 
-    def _earliest(self) -> FloatArray:
-        """Return the earliest time from which on the volume is clear, with that of stability."""
+    def _earliest_recovery_s(self) -> FloatArray:
+        """Return the earliest time (s) with values clear of the volumes plus the stability time."""
         count = len(self._kind.own_value)
         red, green = np.zeros(count), np.full(count, self._lookahead_s + 1.0)
         probe = np.full(count, self._lookahead_s)
         on = np.ones(count, dtype=bool)
         while on.any():
-            leads = self._leads(self._is_clear_until(probe[:, np.newaxis]))
+            leads = self._has_clear_interval(self._is_clear_until(probe[:, np.newaxis]))
             green = np.where(on & leads, probe, green)
             red = np.where(on & ~leads, probe, red)
             probe = 0.5 * (red + green)

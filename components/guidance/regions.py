@@ -31,7 +31,7 @@ class GuidedIntruders(NamedTuple):
     bounds: Bounds | None = None
 
     def rows(self, which: AnyArray) -> "GuidedIntruders":
-        """Return those of some ownships."""
+        """Return the intruders of the given ownships."""
         present = None if self.present is None else self.present[which]
         return GuidedIntruders(
             self.state.rows(which),
@@ -41,15 +41,15 @@ class GuidedIntruders(NamedTuple):
             select_bounds(self.bounds, which),
         )
 
-    def is_there(self) -> BoolArray:
-        """Return where there is an intruder."""
+    def is_present(self) -> BoolArray:
+        """Return a mask (n,), True for ownships that have this intruder."""
         if self.present is None:
             return np.ones(len(self.early_level), dtype=bool)
         return self.present
 
 
 class Concerned(NamedTuple):
-    """An intruder whose volume of a region counts, of some ownships."""
+    """An intruder whose volume counts for a region, with a mask of the ownships concerned."""
 
     intruder: int  # Index of the intruder
     level: Level  # Whose volume
@@ -76,7 +76,7 @@ class Regions:
         self._concerned: dict[str, tuple[BoolArray, list[Concerned]]] = {}
 
     def conflicts(self, place: int, level: Level) -> Conflicts:
-        """Return when the manoeuvres meet the volume of a level about an intruder."""
+        """Return the manoeuvres' conflicts with a level's volume at an intruder, computed once."""
         key = place, level.volume, level.uncertain
         if key not in self._conflicts:
             intruder = self._intruders[place]
@@ -86,13 +86,17 @@ class Regions:
         return self._conflicts[key]
 
     def concerned_intruders(self, region: str) -> tuple[BoolArray, list[Concerned]]:
-        """Return which intruders any level assigns to the region, and the volumes that count."""
+        """Return a mask (n,) of ownships with an intruder for which a level has the region, and the
+        intruders whose volumes count.
+        """
         if region not in self._concerned:
             self._concerned[region] = self._find_concerned(region)
         return self._concerned[region]
 
-    def clear(self, region: str) -> tuple[BoolArray, BoolArray]:
-        """Return rows (n,) where a level assigns the region, and its safe values (n, k)."""
+    def safe_values(self, region: str) -> tuple[BoolArray, BoolArray]:
+        """Return a mask (n,) of ownships with an intruder for which a level has the region, and a
+        mask (n, k) of the values that are safe.
+        """
         known, concerned = self.concerned_intruders(region)
         clear = self._kind.there.copy()
         for one in concerned:
@@ -100,21 +104,23 @@ class Regions:
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return known, clear
 
-    def leads(self, clear: BoolArray) -> BoolArray:
-        """Return which rows have an interval of clear values: two neighbours within the limits."""
+    def has_clear_interval(self, clear: BoolArray) -> BoolArray:
+        """Return a mask (n,), True for ownships with two neighbouring clear values in limits."""
         return has_interval(self._kind, clear)
 
     def is_in_corrective(self) -> BoolArray:
-        """Return which ownships are inside the corrective volume of an intruder now."""
+        """Return a mask (n,), True for ownships now inside an intruder's corrective volume."""
         inside = np.zeros(len(self._own.up_m), dtype=bool)
         for index, intruder in enumerate(self._intruders):
             level = self._configuration.corrective_level(intruder.alerter)
             if level is not None:
-                inside |= (self._begin_s(index, level) == 0.0) & intruder.is_there()
+                inside |= (self._conflict_start_s(index, level) == 0.0) & intruder.is_present()
         return inside
 
-    def _begin_s(self, place: int, level: Level) -> FloatArray:
-        """Return when the flights as they are meet the volume of a level, within the lookahead."""
+    def _conflict_start_s(self, place: int, level: Level) -> FloatArray:
+        """Return when (s) the ownships, flying on as they are, enter a level's volume around an
+        intruder, within the lookahead.
+        """
         key = place, level.volume, level.uncertain
         if key not in self._begins:
             intruder = self._intruders[place]
@@ -133,9 +139,9 @@ class Regions:
             if numbered is None:
                 continue
             number, level = numbered
-            there = intruder.is_there()
+            there = intruder.is_present()
             known |= there
-            begin_s = self._begin_s(index, level)
+            begin_s = self._conflict_start_s(index, level)
             early = intruder.early_level == number
             due_s = np.where(early, level.early_alerting_time_s, level.alerting_time_s)
             ahead = (begin_s == 0.0) | is_surely_less(begin_s, due_s)
@@ -149,7 +155,7 @@ class Regions:
 
 
 def has_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
-    """Return in which rows (n, k) two neighbours are clear, and not both beyond a limit."""
+    """Return a mask (n,), True for rows with neighbouring clear values not both beyond a limit."""
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:
         low = np.maximum(kind.values[:, :-1], kind.least[:, np.newaxis])

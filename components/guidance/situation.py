@@ -23,7 +23,7 @@ class State(NamedTuple):
     climb_mps: FloatArray
 
     def relative_to(self, other: "State") -> Relative:
-        """Return these states less others."""
+        """Return the differences of these states and others, part by part."""
         return tuple(mine - theirs for mine, theirs in zip(self, other, strict=True))
 
     def rows(self, which: Any) -> "State":
@@ -37,14 +37,14 @@ class State(NamedTuple):
 
 @dataclass(frozen=True)
 class Detector:
-    """A volume, or an open cylinder, that flights must not meet; arrays as the flights."""
+    """A volume, or an upright cylinder, no flight must enter; arrays of the flights' shape."""
 
     volume: Volume | TcasAdvisory | None = None
     cylinder_m: tuple[Any, Any] | None = None  # Radius and half height, where there is no volume
     bounds: Bounds | None = None  # How far the relative states may be wrong, for the volume
 
     def span(self, own: State, intruder: State, begin_s: Any, end_s: Any) -> Span:
-        """Return from when to when flights meet it."""
+        """Return from when to when (s) flights are inside the volume."""
         relative = own.relative_to(intruder)
         if self.volume is not None:
             vertical = own.up_m, own.climb_mps
@@ -53,14 +53,16 @@ class Detector:
         return cylinder_span(*self.cylinder_m, relative, begin_s, end_s)
 
 
-def meets(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
-    """Return whether a volume is violated during part of the examined time."""
+def overlaps_time(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
+    """Return a mask, True if a span in the volume overlaps the examined time by over an instant."""
     result = is_surely_less(np.maximum(span.begin_s, begin_s), np.minimum(span.end_s, end_s))
     return np.asarray(result & (np.asarray(begin_s) < end_s))
 
 
-def is_met_at(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
-    """Return whether a volume is violated at an instant, if `from_s` leaves no more time."""
+def contains_instant(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
+    """Return a mask, True where the examined time is a single instant, ends at ``from_s``, and lies
+    in the span.
+    """
     alone = np.asarray((begin_s == end_s) & (from_s == end_s))
     if not alone.any():
         return alone

@@ -12,10 +12,10 @@ from components.high_precision.multiprecision import multiprecision
 DIGITS = 40
 
 
-def detection_error(
+def detection_probability_error(
     pd: float, snr: float, pulses: int, false_alarm_probability: float, swerling: int
 ) -> float:
-    """Return how far a probability of detection is from the truth at a mean SNR.
+    """Return the absolute error of a detection probability, against mpmath at many digits.
 
     The sum of `pulses` echoes holds a random number K of signal quanta: Poisson for a steady
     target, negative binomial for a fluctuating one (shape 1, n, 2, 2 n for Swerling I to IV). Given
@@ -45,12 +45,12 @@ def detection_error(
     """
     mp = multiprecision()
     with mp.workdps(DIGITS):
-        miss = _miss(mp, snr, pulses, false_alarm_probability, swerling)
+        miss = _miss_probability(mp, snr, pulses, false_alarm_probability, swerling)
         return float(abs(mp.mpf(float(pd)) - 1 + miss))
 
 
-def _miss(mp: Any, snr: float, n: int, pfa: float, swerling: int) -> Any:
-    threshold = _threshold(mp, n, pfa)
+def _miss_probability(mp: Any, snr: float, n: int, pfa: float, swerling: int) -> Any:
+    threshold = _detection_threshold(mp, n, pfa)
     quanta = n * mp.mpf(float(snr))
     # Negative binomial; a shape of 0 stands for the steady target's Poisson.
     shape = (0, 1, n, 2, 2 * n)[swerling]
@@ -75,8 +75,8 @@ def _miss(mp: Any, snr: float, n: int, pfa: float, swerling: int) -> Any:
     return miss
 
 
-def _threshold(mp: Any, n: int, pfa: float) -> Any:
-    """Solve Q(n, V) = Pfa."""
+def _detection_threshold(mp: Any, n: int, pfa: float) -> Any:
+    """Return the threshold V that n noise pulses' sum exceeds with probability Pfa (mpmath)."""
     wanted = mp.mpf(float(pfa))
     if n == 1:
         return -mp.log(wanted)

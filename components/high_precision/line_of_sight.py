@@ -16,7 +16,8 @@ def line_of_sight_errors(
     attitude: tuple[float, float, float],
     given: tuple[float, float, float],
 ) -> tuple[float, float, float, float]:
-    """Return the errors of a line of sight in the ownship's body axes.
+    """Return the absolute errors of a given line of sight in direction, azimuth and elevation (rad)
+    and in range (m), against one at many digits.
 
     Through Earth-centred coordinates, the textbook way that loses digits in doubles.
 

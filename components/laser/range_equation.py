@@ -22,21 +22,21 @@ from components.arguments.checks import broadcast_flat, check_not_negative, posi
 from components.optical.detection import detection_probability
 
 __all__ = [
-    "laser_power_w",
+    "beam_share_on_target",
+    "beam_share_on_wire",
+    "mean_shots_on_target",
+    "received_laser_power_w",
     "scan_detection_probability",
-    "shots_on_target",
-    "target_share",
-    "wire_share",
 ]
 
 
-def target_share(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
-    """Return the share of the beam's disc that a target which shows an area fills."""
+def beam_share_on_target(area_m2: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
+    """Return the share, at most 1, of the beam at a range that a target of some area fills."""
     return _filled_beam_share("area_m2", area_m2, range_m, divergence_rad, 2)
 
 
-def wire_share(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
-    """Return the share of the beam's disc that a wire through its middle fills: 4 d / (π θ R)."""
+def beam_share_on_wire(diameter_m: ArrayLike, range_m: ArrayLike, divergence_rad: float) -> Any:
+    """Return the beam's share (at most 1) that a wire across its middle fills: 4 d / (π θ R)."""
     return _filled_beam_share("diameter_m", diameter_m, range_m, divergence_rad, 1)
 
 
@@ -50,7 +50,7 @@ def _filled_beam_share(
     return unflatten(np.minimum(filled / (0.25 * math.pi * width_m**power), 1.0), shape)
 
 
-def laser_power_w(
+def received_laser_power_w(
     share: ArrayLike,
     range_m: ArrayLike,
     *,
@@ -60,7 +60,7 @@ def laser_power_w(
     reflectivity: ArrayLike = 1.0,
     extinction_per_m: float = 0.0,
 ) -> Any:
-    """Return the peak power that comes back from a Lambertian target which takes a share, W.
+    """Return the peak power (W) received from a Lambertian target filling a share of the beam.
 
     `efficiency` is that of transmitter and receiver together, `extinction_per_m` that of the air.
     Jelalian, eq. 1.1 with the cross-sections of his chapter 1; R. D. Richmond and S. C. Cain,
@@ -81,10 +81,10 @@ def laser_power_w(
         return unflatten(sent_w * part * bright * collected * left, shape)
 
 
-def shots_on_target(
+def mean_shots_on_target(
     area_rad2: ArrayLike, beam_area_rad2: ArrayLike, spacing_rad2: ArrayLike
 ) -> Any:
-    """Return how many shots of a scan meet a target in the mean, each with its whole share.
+    """Return the mean number of a scan's shots that hit a target, each with its whole share.
 
     The larger of the target and the beam, over the solid angle of a shot (sr). What a beam meets
     with its edge alone is not counted as a shot of its own: shots times share times the disc is the
@@ -102,7 +102,7 @@ def shots_on_target(
 def scan_detection_probability(
     snr: ArrayLike, shots: ArrayLike, *, threshold: float, needed: int = 1
 ) -> Any:
-    """Return the probability that a scan detects a target.
+    """Return the probability that in a scan at least `needed` shots on target exceed threshold.
 
     Each shot that meets it is detected where its amplitude (over the noise's standard deviation, of
     optical power) with Gaussian noise reaches the threshold, Q(threshold - SNR), and `needed` of

@@ -7,25 +7,29 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.atmosphere.infrared import haze_share_at
+from components.atmosphere.infrared import haze_extinction_ratio_at
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import sector_width_rad, unit_vector
 from components.laser.range_equation import (
-    laser_power_w,
+    beam_share_on_target,
+    beam_share_on_wire,
+    mean_shots_on_target,
+    received_laser_power_w,
     scan_detection_probability,
-    shots_on_target,
-    target_share,
-    wire_share,
 )
 from components.optical.area_of_cells import area_of_cells
 from components.optical.detection import detection_probability, deviations_of_exceedance
-from components.optical.weather_effects import TRANSMISSION, CellsInTheWay, obscuration
+from components.optical.weather_effects import (
+    TRANSMISSION,
+    CellsInTheWay,
+    haze_visibility_and_rain_extinction,
+)
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.measurement import range_variance
-from components.sensor.cued_looks import refuse_cues
-from components.sensor.ladder_values import measure_cells
-from components.sensor.look import Cells, Look, values_of
-from components.sensor.marks import LASER
+from components.sensor.cued_looks import refuse_if_cued
+from components.sensor.ladder_values import make_cell_measure
+from components.sensor.look import Cells, Look, effect_values_of_cells
+from components.sensor.palette import LASER
 from components.sensor.parameters import RangeErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -112,7 +116,7 @@ class LaserParameters(RangeErrorParameters, SensorParameters):
         return self
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence if a scan's single shot cannot give the hits that are needed."""
+        """Return the base class's notes, and one more if a single shot must give several hits."""
         said = super().ineffective_key_notes()
         if self.pattern == "one_shot" and self.hits_needed > 1:
             said.append("hits_needed is more than the one shot of a scan: nothing is detected")
@@ -123,15 +127,15 @@ EXTINCTION = Hook("extinction", float, "extinction by the air at the laser's wav
 
 
 def _extinction_per_m(block: Any) -> float:
-    haze_m, rain_per_m = obscuration(block.context.sections["weather"])
+    haze_m, rain_per_m = haze_visibility_and_rain_extinction(block.context.sections["weather"])
     if haze_m is None:
         return rain_per_m
-    share = float(haze_share_at(haze_m, block.p.wavelength_um))
+    share = float(haze_extinction_ratio_at(haze_m, block.p.wavelength_um))
     return rain_per_m + KOSCHMIEDER / haze_m * share
 
 
 class LaserExtinction(Effect[float]):
-    """Haze, fog and rain take of the pulse both ways (Kruse's law with Kim's exponent)."""
+    """Pulse attenuation by haze, fog and rain, out and back (Kruse's law, Kim's exponent)."""
 
     name = "laser extinction"
     acts_on = EXTINCTION
@@ -146,13 +150,13 @@ class LaserExtinction(Effect[float]):
 
 
 def _pd(sensor: Any, cells: Cells) -> dict[str, FloatArray]:
-    """Return each cell's probability of detection; a boundary sees all within."""
+    """Return cells' detection probability as a column; for a range boundary 1 or 0."""
     if isinstance(sensor, ScanningLaser):
         return {_PD.name: sensor.detection_probability(cells)}
     return {_PD.name: np.where(sensor.look(cells).detected, 1.0, 0.0)}
 
 
-def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
+def _boundary_settings(block: Mapping[str, Any]) -> dict[str, Any]:
     if not block.get("range_km"):
         raise Unavailable("needs range_km to put the boundary at")
     beam_deg = math.degrees(1e-3 * block["divergence_mrad"])
@@ -165,13 +169,13 @@ def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
 SHOTS = Ladder(
     "shots",
     (
-        Rung("range_boundary", "all inside range_km", "radar.range_boundary", _boundary),
+        Rung("range_boundary", "all inside range_km", "radar.range_boundary", _boundary_settings),
         Rung("one_shot", "one shot a scan at each target", parameters={"pattern": "one_shot"}),
         Rung("scanned", "the shots of the scan's pattern", parameters={"pattern": "scanned"}),
     ),
     "scanned",
     (_PD,),
-    measure_cells(_pd, out_of_range=0.0),
+    make_cell_measure(_pd, out_of_range=0.0),
 )
 
 
@@ -209,11 +213,11 @@ class ScanningLaser(SweepingSensor):
 
     def setup(self) -> None:
         """Store the air's attenuation of pulses, and raise if the scanner is wired to cues."""
-        refuse_cues(self, "its pattern is fixed, with one threshold")
+        refuse_if_cued(self, "its pattern is fixed, with one threshold")
         self._extinction_per_m = self.built_one(EXTINCTION) or 0.0
 
     def snr_and_shots(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
-        """Return each cell's amplitude over noise in one shot, and the mean shots of a scan."""
+        """Return each cell's ratio of echo amplitude to noise in a shot, and a scan's mean hits."""
         column = cells.roster.column
         thick_m = 1e-3 * cells.of_target(column("laser.wire_diameter_mm"))
         wire = np.isfinite(thick_m)
@@ -223,21 +227,21 @@ class ScanningLaser(SweepingSensor):
             area_m2 = np.where(np.isnan(area_m2), area_of_cells(cells, "eo", "exact"), area_m2)
         area_m2 = np.where(wire, 0.0, area_m2)
         # A wire that runs away from us shows less of its length, and is lit at a slant.
-        slant = _slant(cells) if wire.any() else np.ones(len(cells))
+        slant = _sine_to_wire(cells) if wire.any() else np.ones(len(cells))
         range_m, beam_rad = cells.range_m, self.divergence_rad
         share = np.where(
             wire,
-            slant * wire_share(thick_m, range_m, beam_rad),
-            target_share(area_m2, range_m, beam_rad),
+            slant * beam_share_on_wire(thick_m, range_m, beam_rad),
+            beam_share_on_target(area_m2, range_m, beam_rad),
         )
-        power_w = laser_power_w(
+        power_w = received_laser_power_w(
             share, range_m, peak_power_w=self.p.peak_power_w,
             aperture_m=1e-3 * self.p.aperture_mm, efficiency=self.p.efficiency,
             reflectivity=cells.of_target(column("laser.reflectivity")),
             extinction_per_m=self._extinction_per_m,
         )  # fmt: skip
         for left in self.built(TRANSMISSION):
-            power_w = power_w * values_of(self, left, cells) ** 2
+            power_w = power_w * effect_values_of_cells(self, left, cells) ** 2
         snr = np.minimum(power_w / self.p.noise_equivalent_power_w, _STRONGEST)
         if self.p.pattern == "one_shot":
             return snr, np.ones(len(cells))
@@ -245,7 +249,7 @@ class ScanningLaser(SweepingSensor):
         length_rad = slant * length_m / range_m
         # Rows of shots are as far apart everywhere, columns nearer to each other up and down.
         _, elevation = self.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
-        shots = shots_on_target(
+        shots = mean_shots_on_target(
             np.where(wire, length_rad * thick_m / range_m, area_m2 / range_m**2),
             0.25 * math.pi * beam_rad * np.where(wire, length_rad, beam_rad),
             self._spacing_rad2 * np.maximum(np.cos(elevation), 1e-6),
@@ -254,20 +258,20 @@ class ScanningLaser(SweepingSensor):
 
     def detection_probability(self, cells: Cells) -> FloatArray:
         """Return the probability that a scan detects each cell's target."""
-        return self._probability(*self.snr_and_shots(cells))
+        return self._scan_detection_probability(*self.snr_and_shots(cells))
 
-    def _probability(self, snr: FloatArray, shots: FloatArray) -> FloatArray:
+    def _scan_detection_probability(self, snr: FloatArray, shots: FloatArray) -> FloatArray:
         pd: FloatArray = scan_detection_probability(
             snr, shots, threshold=self.threshold, needed=self.p.hits_needed
         )
         return pd
 
     def look(self, cells: Cells) -> Look:
-        """Decide by one draw whether a scan detects each target, and how strong its echo was."""
+        """Draw for each cell whether one scan detects the target, and the strength of its echo."""
         from scipy.special import ndtri
 
         snr, shots = self.snr_and_shots(cells)
-        probability = self._probability(snr, shots)
+        probability = self._scan_detection_probability(snr, shots)
         drawn = 1.0 - cells.draws(self._draws)
         detected = drawn <= probability
         # What crossed the threshold, by the share of such echoes that come out stronger.
@@ -278,19 +282,21 @@ class ScanningLaser(SweepingSensor):
         strength = np.maximum(strength, self.threshold)
         snr_db = 20.0 * np.log10(strength)
         extras: dict[str, AnyArray] = {"snr_db": snr_db}
-        if self._is_asked_for_looks:
+        if self._is_every_look_recorded:
             extras["detection_probability"] = probability
         above_db = snr_db - 20.0 * math.log10(self.threshold)
         return Look(detected, above_db, extras, {"amplitude": strength})
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what is recorded beside a detection: nothing that only the truth gives."""
+        """Return the columns recorded with a detection, without the probability of detection, which
+        only the simulation knows.
+        """
         extras = dict(super()._extras(cells, look))
         extras.pop("detection_probability", None)
         return extras
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the variances of a pulse's flight and of where in the beam its echo was made."""
+        """Return variances of azimuth, elevation (beam width), range (pulse length, amplitude)."""
         amplitude = signal["amplitude"]
         angle = np.full(len(amplitude), self.divergence_rad**2 / 12.0)
         pulse_m = 0.5 * 0.299792458 * self.p.pulse_ns
@@ -305,7 +311,7 @@ class ScanningLaser(SweepingSensor):
         return {**super().report(), "lasers": {self.name: used}}
 
 
-def _slant(cells: Cells) -> FloatArray:
+def _sine_to_wire(cells: Cells) -> FloatArray:
     """Return the sine of the angle between each cell's line of sight and its wire."""
     direction, slope = (
         np.radians(cells.of_target(cells.roster.column(f"laser.wire_{name}_deg")))

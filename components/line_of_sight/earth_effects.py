@@ -10,24 +10,24 @@ import numpy as np
 from components.environment.tables import Terrain
 from components.geometry import POSITION_FIELDS, SeenFromOwnship, sensor_angles
 from components.terrain.rays import (
-    bent_elevation_rad,
     is_behind_limb,
     is_behind_terrain,
-    miss_bound_m,
+    max_undetected_ground_m,
+    refracted_elevation_rad,
 )
 from dsa_des.arrays.types import BoolArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 class Hides(Protocol):
-    """Finds the targets that terrain or the Earth's limb hide."""
+    """Function that returns which targets (True) terrain or the Earth's limb hides."""
 
     def __call__(self, own: Any, other: Any, present: BoolArray, /) -> BoolArray:
         """Return which of the targets that are `present` are hidden, from states of both."""
 
 
 class Bends(Protocol):
-    """Bends rays."""
+    """Function that returns lines of sight with their elevation changed by refraction."""
 
     def __call__(self, own: Any, seen: SeenFromOwnship, attitude: str, /) -> SeenFromOwnship:
         """Return lines of sight along bent rays, by a model of the `attitude`."""
@@ -38,7 +38,7 @@ BENDS = Hook("bends", Bends, "seen: lines of sight along bent rays")
 
 
 def terrain_section(block: Any) -> Terrain:
-    """Return the scene's ``[terrain]``, or what it is by default."""
+    """Return the scene's ``[terrain]`` section, or one with default values if there is none."""
     terrain = block.context.sections.get("terrain")
     return Terrain() if terrain is None else terrain
 
@@ -56,10 +56,10 @@ class Limb(Effect[Hides]):
         return Verdict(horizon, f"[terrain] horizon is {str(horizon).lower()}")
 
     def build(self, block: Any) -> Hides:
-        """Return what tells which targets are behind the limb."""
+        """Return a function that masks targets behind the limb (True: hidden; absent: False)."""
         terrain = terrain_section(block)
         surface_m = terrain.height_m or 0.0
-        return _ask_for_present(
+        return _hide_only_present(
             lambda a, b: is_behind_limb(a, b, surface_m=surface_m, refraction=terrain.refraction)
         )
 
@@ -79,16 +79,18 @@ class Mountains(Effect[Hides]):
         raster = file.raster
         return Verdict(
             True,
-            f"[terrain] raster is {raster.name} ({raster.box()}); nothing hides beside it, and "
-            f"of what stands in a line of sight up to {miss_bound_m(raster):.2g} m may be missed",
+            f"[terrain] raster is {raster.name} ({raster.bounds_text()}); nothing hides beside "
+            f"it, and "
+            f"of what stands in a line of sight up to {max_undetected_ground_m(raster):.2g} m may "
+            f"be missed",
         )
 
     def build(self, block: Any) -> Hides:
-        """Return what tells which targets are behind the ground."""
+        """Return a function that masks targets behind terrain (True: hidden; absent: False)."""
         terrain = terrain_section(block)
         assert terrain.raster is not None
         raster = terrain.raster.raster
-        return _ask_for_present(
+        return _hide_only_present(
             lambda a, b: is_behind_terrain(
                 a, b, raster, offset_m=terrain.raster_zero_m, refraction=terrain.refraction
             )
@@ -108,11 +110,11 @@ class Refraction(Effect[Bends]):
         return Verdict(refraction != "none", f"[terrain] refraction is {refraction!r}")
 
     def build(self, block: Any) -> Bends:
-        """Return what turns straight lines of sight into those along which rays arrive."""
+        """Return a function that makes lines of sight apparent, elevation raised by refraction."""
         refraction = terrain_section(block).refraction
 
         def bends(own: Any, seen: SeenFromOwnship, attitude: str) -> SeenFromOwnship:
-            elevation = bent_elevation_rad(seen.elevation_rad, seen.range_m, refraction)
+            elevation = refracted_elevation_rad(seen.elevation_rad, seen.range_m, refraction)
             body = sensor_angles(
                 seen.azimuth_rad,
                 elevation,
@@ -130,8 +132,8 @@ class Refraction(Effect[Bends]):
 EARTH_EFFECTS = (Limb(), Mountains(), Refraction())
 
 
-def _ask_for_present(hidden_of: Callable[[Any, Any], BoolArray]) -> Hides:
-    """Return what asks of the targets that are there only; the others count as not hidden."""
+def _hide_only_present(hidden_of: Callable[[Any, Any], BoolArray]) -> Hides:
+    """Return a function that asks `hidden_of` for present targets; absent ones get False."""
 
     def hides(own: Any, other: Any, present: BoolArray) -> BoolArray:
         hidden = np.zeros(present.shape, dtype=bool)

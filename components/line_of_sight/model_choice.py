@@ -12,8 +12,10 @@ from components.messages.reach import REACH_MARGIN, FarthestLook, farthest_look
 from dsa_des.block.component import Context
 
 
-def seeming_look(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
-    """Return a look's request in true ranges, given ranges by a model of the Earth."""
+def convert_model_ranges(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
+    """Return the request with its range, which is by a model of the Earth, moved to `seeming`; the
+    reference model's stays, and without known traffic it is infinite.
+    """
     if earth == REFERENCE[0] or look.range_m == 0.0 or not math.isfinite(look.range_m):
         return look
     if _known_traffic(context) is None:
@@ -22,7 +24,7 @@ def seeming_look(context: Context, earth: str, look: FarthestLook) -> FarthestLo
 
 
 def _known_traffic(context: Context) -> KnownTraffic | None:
-    """Return what the only producer says of its traffic, if it does."""
+    """Return the only producer's `KnownTraffic`; None if several produce or it offers none."""
     offers = [producer.offer for producer in context.producers]
     return offers[0] if len(offers) == 1 and isinstance(offers[0], KnownTraffic) else None
 
@@ -43,7 +45,7 @@ _LARGEST_RELATIVE_RANGE = 0.5 * (REACH_MARGIN - 1.0)
 
 @dataclass(frozen=True)
 class Allowance:
-    """Errors that a scene allows its lines of sight; infinite where it does not judge."""
+    """Largest line-of-sight errors that ``[accuracy]`` allows; infinite where it sets no limit."""
 
     angle_rad: float = math.inf
     range_m: float = math.inf
@@ -51,7 +53,7 @@ class Allowance:
     relative_range: float = math.inf
 
     def describe_excess(self, bound: ErrorBound) -> str:
-        """Return which error bound is exceeded, or an empty string."""
+        """Return a phrase naming the first error bound above its allowance; empty if none is."""
         if bound.angle_rad > self.angle_rad:
             return (
                 f"an error in angle of {angle_text(bound.angle_rad)} cannot be excluded, and "
@@ -64,20 +66,22 @@ class Allowance:
             )
         if bound.relative_range > _LARGEST_RELATIVE_RANGE:
             return (
-                f"ranges may be off by {_share(bound.relative_range)}, too much to tell which "
+                f"ranges may be off by {_percent_text(bound.relative_range)}, too much to tell "
+                f"which "
                 "targets come in reach"
             )
         if bound.relative_range > self.relative_range:
             return (
                 f"its error in range could change a Pd by more than [accuracy] leaves (ranges to "
-                f"{_share(bound.relative_range)}, of which {_share(self.relative_range)} may be)"
+                f"{_percent_text(bound.relative_range)}, of which "
+                f"{_percent_text(self.relative_range)} may be)"
             )
         return ""
 
 
 @dataclass(frozen=True)
 class ModelChoice:
-    """What was chosen, with its bound, and why each cheaper one was not."""
+    """The chosen Earth and attitude models, their error bound, why cheaper ones were refused."""
 
     earth: str
     attitude: str
@@ -85,13 +89,13 @@ class ModelChoice:
     refused: tuple[str, ...]  # "flat earth: …", cheapest first
 
 
-def choose(
+def choose_cheapest_models(
     earths: tuple[str, ...],
     attitudes: tuple[str, ...],
     envelopes: Sequence[Envelope],
     allowed: Allowance,
 ) -> ModelChoice:
-    """Return the cheapest pair of models whose proven error is allowed."""
+    """Return the cheapest models (Earth, attitude) of allowed proven error, else the most exact."""
     pairs = sorted(
         ((earth, attitude) for earth in earths for attitude in attitudes),
         key=lambda pair: (EARTH_COST[pair[0]] + ATTITUDE_COST[pair[1]], pair),
@@ -103,7 +107,7 @@ def choose(
         if not complaint:
             break
         # The exact attitude comes later: what it does not cure is the Earth's fault.
-        refused[earth] = f"{name_of(earth, attitude)}: {complaint}"
+        refused[earth] = f"{model_label(earth, attitude)}: {complaint}"
     else:
         earth, attitude = max(earths, key=EARTH_MODELS.index), min(attitudes)
         bound = _largest_bounds([error_bound(earth, envelope, attitude) for envelope in envelopes])
@@ -115,8 +119,8 @@ def _largest_bounds(bounds: Sequence[ErrorBound]) -> ErrorBound:
     return ErrorBound(*map(max, zip(*columns, strict=True)))
 
 
-def name_of(earth: str, attitude: str = "exact") -> str:
-    """Return a model's name as one would say it."""
+def model_label(earth: str, attitude: str = "exact") -> str:
+    """Return a model pair's label for messages, as `flat earth with small-angle attitude`."""
     name = earth.replace("_", " ")
     return name if attitude == "exact" else f"{name} with {attitude.replace('_', '-')} attitude"
 
@@ -131,7 +135,7 @@ def range_text(range_m: float) -> str:
     return "any size" if math.isinf(range_m) else f"{range_m:.2g} m"
 
 
-def _share(relative: float) -> str:
+def _percent_text(relative: float) -> str:
     return "any share" if math.isinf(relative) else f"{100.0 * relative:.2g} %"
 
 
@@ -145,8 +149,8 @@ class PickedModels:
     sentences: tuple[str, ...] = ()  # For `explain`
 
 
-def pick_rung(transform: Any) -> PickedModels:
-    """Pick a transform's models, once its consumers and producers are known.
+def pick_models(transform: Any) -> PickedModels:
+    """Return a transform's Earth and attitude models, once consumers and producers are known.
 
     What the scene names is taken. Exact models, and those that are left to ``auto``, give way to
     cheaper ones where ``[accuracy]`` allows their errors: ``auto`` is judged by those of
@@ -168,7 +172,7 @@ def pick_rung(transform: Any) -> PickedModels:
     ]  # fmt: skip
 
     def stay(because: str) -> PickedModels:
-        sentence = f"geometry: {name_of(*exact)}, {because}"
+        sentence = f"geometry: {model_label(*exact)}, {because}"
         return PickedModels(*exact, sentences=(sentence,) if auto or given else ())
 
     if not any(free) or not (auto or len(given) == 2):
@@ -180,7 +184,7 @@ def pick_rung(transform: Any) -> PickedModels:
     look = farthest_look(consumer.request for consumer in transform.context.consumers)
     if look.exact_because:
         return stay(f"the reference: {look.exact_because}")
-    envelopes = _envelopes(transform, look)
+    envelopes = _line_of_sight_envelopes(transform, look)
     if envelopes is None:
         return stay("the reference: the traffic does not say where its targets can be")
     allowed = Allowance(
@@ -188,7 +192,7 @@ def pick_rung(transform: Any) -> PickedModels:
         tolerance.get("range_m", math.inf),
         look.range_slack,
     )
-    choice = choose(
+    choice = choose_cheapest_models(
         tuple(EARTH_COST) if free[0] else (exact[0],),
         ("small_angle", "exact") if free[1] else (exact[1],),
         envelopes,
@@ -204,7 +208,7 @@ def pick_rung(transform: Any) -> PickedModels:
     ]
     silent = [key for key in ("angle_deg", "range_m") if key not in tolerance]
     judged += [f"[accuracy] {key} is not given and not judged" for key in silent]
-    picked = f"geometry: {name_of(choice.earth, choice.attitude)}, {'; '.join(judged)}"
+    picked = f"geometry: {model_label(choice.earth, choice.attitude)}, {'; '.join(judged)}"
     return PickedModels(
         choice.earth,
         choice.attitude,
@@ -213,8 +217,8 @@ def pick_rung(transform: Any) -> PickedModels:
     )
 
 
-def _envelopes(transform: Any, look: FarthestLook) -> list[Envelope] | None:
-    """Return where each sensor's lines of sight can lie, if the traffic says so."""
+def _line_of_sight_envelopes(transform: Any, look: FarthestLook) -> list[Envelope] | None:
+    """Return each sensor's bounds in range, altitude and angle; None if traffic states none."""
     known = _known_traffic(transform.context)
     if known is None:
         return None

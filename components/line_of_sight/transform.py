@@ -20,16 +20,21 @@ from components.line_of_sight.earth_effects import (
     HIDES,
     terrain_section,
 )
-from components.line_of_sight.model_choice import REFERENCE, PickedModels, pick_rung, seeming_look
+from components.line_of_sight.model_choice import (
+    REFERENCE,
+    PickedModels,
+    convert_model_ranges,
+    pick_models,
+)
 from components.messages.reach import FarthestLook, farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.errors import OWNSHIP, NavigationErrors
 from components.sensor.ladder_values import (
-    angle_apart_mrad,
-    angular_distance_mrad,
+    absolute_angle_difference_mrad,
+    angle_between_vectors_mrad,
     spread_over_roster,
 )
-from dsa_des.arrays.column_values import constant_if_equal, first_row_if_constant
+from dsa_des.arrays.column_values import first_row_if_stored_once, store_once_if_equal
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung, Unavailable, Verified
@@ -41,15 +46,19 @@ _MRAD_PER_DEG = 1e3 * np.pi / 180.0
 #: Angles are the sensors' (ownship's body axes). Near the zenith of those axes azimuth means
 #: little, so costs are weighed against the angle between the lines of sight.
 QUANTITIES = (
-    Quantity("direction", "mrad", angle_apart_mrad, "angle_deg", _MRAD_PER_DEG),
-    Quantity("azimuth", "mrad", angular_distance_mrad),
-    Quantity("elevation", "mrad", angular_distance_mrad),
+    Quantity("direction", "mrad", angle_between_vectors_mrad, "angle_deg", _MRAD_PER_DEG),
+    Quantity("azimuth", "mrad", absolute_angle_difference_mrad),
+    Quantity("elevation", "mrad", absolute_angle_difference_mrad),
     Quantity("range", "m", tolerance="range_m"),
 )
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the lines of sight that a transform gives, in body axes."""
+def measured_lines_of_sight(
+    block: Component, wake: Wake, reference: Component
+) -> dict[str, AnyArray]:
+    """Run the transform on a wake and return direction, azimuth, elevation and range in body axes,
+    (rows, all targets of the roster).
+    """
     seen: Any = block.run(wake)
     return {
         "direction": spread_over_roster(
@@ -61,17 +70,19 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     }
 
 
-def _straight(block: Any) -> str:
-    """Return a sentence where the scene has straight rays; an empty string where they bend."""
+def _straight_rays_note(block: Any) -> str:
+    """Return why refraction needs no simulation with straight rays; empty where they bend."""
     bends = terrain_section(block).refraction != "none"
     return "" if bends else "[terrain] refraction is 'none': rays are straight"
 
 
-def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+def line_of_sight_truth_errors(
+    block: Component, wake: Wake, cells: IntArray
+) -> dict[str, FloatArray]:
     """Return a transform's errors against the line of sight at 40 digits (needs mpmath)."""
     from components.high_precision.line_of_sight import line_of_sight_errors
 
-    if not _straight(block):
+    if not _straight_rays_note(block):
         raise Unavailable("nothing more exact is known of bent rays")
     states, seen = wake["states"], block.run(wake)
     errors = []
@@ -105,8 +116,8 @@ EARTH = Ladder(
     ),
     "ellipsoid",
     QUANTITIES,
-    measure,
-    truth,
+    measured_lines_of_sight,
+    line_of_sight_truth_errors,
     clears=("model",),
     map_function="components.line_of_sight.error_map:draw_error_map",
 )  # fmt: skip
@@ -121,8 +132,8 @@ ATTITUDE = Ladder(
     ),
     "exact",
     QUANTITIES,
-    measure,
-    truth,
+    measured_lines_of_sight,
+    line_of_sight_truth_errors,
 )  # fmt: skip
 
 
@@ -135,8 +146,8 @@ REFRACTION = Ladder(
     ),
     "four_thirds",
     QUANTITIES,
-    measure,
-    applies=_straight,
+    measured_lines_of_sight,
+    applies=_straight_rays_note,
 )  # fmt: skip
 
 
@@ -191,28 +202,28 @@ class Transform(Component):
         self._beliefs = self.built(OWNSHIP)
         self._hiding = self.built(HIDES)
         self._bending = self.built(BENDS)
-        self.rung = pick_rung(self)
+        self.rung = pick_models(self)
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
     def request(self, port: str) -> FarthestLook:
-        """Return a request for the targets that a sensor downstream may look at."""
+        """Return the downstream sensors' farthest-reaching request, to pass to the traffic."""
         look = farthest_look(consumer.request for consumer in self.context.consumers)
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
-        return seeming_look(self.context, earth, look)
+        return convert_model_ranges(self.context, earth, look)
 
     def skipped_work_notes(self) -> list[str]:
         """Return a sentence for each geometry model that was picked, with the reason."""
         return [] if self.rung is None else list(self.rung.sentences)
 
     def report(self) -> dict[str, Any]:
-        """Return the models in use, where ``[accuracy]`` had a say in it."""
+        """Return the models in use for the summary; empty if ``[accuracy]`` did not decide."""
         if self.rung is None or self.rung.bound is None:
             return {}
         models = {"earth": self.rung.earth, "attitude": self.rung.attitude}
         return {"models": {self.name: models}}
 
     def offer(self, port: str) -> Any:
-        """Pass on what we were offered."""
+        """Return the offer of the traffic upstream unchanged; None without a producer."""
         return self.context.producers[0].offer if self.context.producers else None
 
     def run(self, wake: Wake) -> Message | None:
@@ -231,12 +242,12 @@ class Transform(Component):
             columns=states.columns,
             culled=states.culled,
             believed={
-                name: constant_if_equal(v) for name, v in self._believed_columns(states).items()
+                name: store_once_if_equal(v) for name, v in self._believed_columns(states).items()
             },
             own_attitude={name: getattr(states, f"own_{name}") for name in POSE_FIELDS[3:]},
             revisit=None
             if states.flights is None
-            else states.flights.seen_by(self._columns_at_other_instants),
+            else states.flights.view_through(self._columns_at_other_instants),
             **self._target_columns(own, states, states.present),
         )
 
@@ -251,7 +262,7 @@ class Transform(Component):
             for first in range(0, rows, step):
                 block = slice(first, first + step)
                 part = self._line_of_sight_columns(
-                    _block(own, block), _block(other, block), present[block]
+                    _take_pose_rows(own, block), _take_pose_rows(other, block), present[block]
                 )
                 seen = seen or {n: np.empty(present.shape, v.dtype) for n, v in part.items()}
                 for name, values in part.items():
@@ -283,7 +294,7 @@ class Transform(Component):
         return fields
 
     def _columns_at_other_instants(self, own: Any, other: Any) -> dict[str, Any]:
-        """Return the fields of the rows at other instants, and where all aircraft are then."""
+        """Return line-of-sight columns at other instants, with targets' and ownship's positions."""
         seen = self._target_columns(own, other, own.present & other.present)
         return {
             **seen,
@@ -292,13 +303,13 @@ class Transform(Component):
         }
 
     def _believed_columns(self, states: TrafficStates) -> dict[str, FloatArray]:
-        """Return what the ownship believes of itself."""
+        """Return the ownship's believed pose by column; the true one without navigation errors."""
         for belief in self._beliefs:
             return belief(states)
         return {name: getattr(states, f"own_{name}") for name in POSE_FIELDS}
 
 
-def _block(state: Any, rows: slice) -> SimpleNamespace:
+def _take_pose_rows(state: Any, rows: slice) -> SimpleNamespace:
     return SimpleNamespace(**{name: getattr(state, name)[rows] for name in POSE_FIELDS})
 
 
@@ -318,7 +329,7 @@ def _broadcast_ownship(states: TrafficStates) -> SimpleNamespace:
 def _require_numbers(*angles: FloatArray) -> None:
     """Refuse what is not a finite number, here for all blocks downstream."""
     # A sum is finite only if all of it is; it stands for whatever the angles came from.
-    if not math.isfinite(sum(first_row_if_constant(values).sum() for values in angles)):
+    if not math.isfinite(sum(first_row_if_stored_once(values).sum() for values in angles)):
         raise ValueError("a position or an attitude of the traffic is not a finite number")
 
 

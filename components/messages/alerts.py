@@ -74,14 +74,14 @@ class AlertLevels(Message):
     #: Whether lengths are those of the plane of `east_north_m`, not of the ground.
     in_plane: bool = static(default=False, kw_only=True)
 
-    def highest(self) -> IntArray:
-        """Return the highest level of each row, 0 where there is no target, (rows,)."""
+    def highest_levels(self) -> IntArray:
+        """Return the highest alert level in each row, 0 in rows without entries, (rows,)."""
         levels = np.zeros(len(self), dtype=np.int64)
         np.maximum.at(levels, self.row_of_entries, self.level)
         return levels
 
-    def contacts(self) -> IntArray:
-        """Return the contact of each entry, as a display numbers it, (entries,).
+    def contact_numbers(self) -> IntArray:
+        """Return each entry's contact number, (entries,).
 
         The index of the target; where a tracker's states are believed, which know no targets,
         `TRACKS_FROM` and the track's number.
@@ -90,7 +90,7 @@ class AlertLevels(Message):
 
 
 def contact_name(names: tuple[str, ...], contact: int) -> str | None:
-    """Return a target's name, or "track 7"; empty for -1, None where there is no such target."""
+    """Return the target's name, or `track 7` for a track; empty for -1, None if unknown."""
     if contact >= TRACKS_FROM:
         return f"track {contact - TRACKS_FROM}"
     if contact < 0:
@@ -99,14 +99,14 @@ def contact_name(names: tuple[str, ...], contact: int) -> str | None:
 
 
 class AlertsOffered(NamedTuple):
-    """What a block offers of the alerts that it sends."""
+    """How many alert levels a block sends, and the time between its scans."""
 
     levels: int  # Of the alerter, which is the highest that may come
     period_s: float  # Between its scans
 
 
 def note_unreached_level(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
-    """Return a note where the producers' alerts never reach the level that a key asks for."""
+    """Return a list with a note if a key asks for a level that no producer sends, else empty."""
     offered = [p.offer.levels for p in producers if isinstance(p.offer, AlertsOffered)]
     if not offered or level <= max(offered):
         return []

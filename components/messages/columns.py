@@ -34,7 +34,7 @@ class TrueLine:
 
 @dataclass(eq=False, kw_only=True)
 class StatedErrors:
-    """The range rate, positive when opening, and mean square errors as the sensor states them.
+    """Measured range rate (positive: opening) and the variances that the sensor states.
 
     A grid's is step²/12; the cut at the edge of a field of view is not in it. Where navigation has
     noise, that of the pose by which angles are turned, and of the position that a range is counted
@@ -65,7 +65,7 @@ MEASURED = tuple(StatedErrors.__dataclass_fields__)
 
 @dataclass(eq=False, kw_only=True)
 class PositionAndVelocity:
-    """The state of six; NaN without a range."""
+    """Position and velocity north, east and down in the frame; NaN for a track without a range."""
 
     north_m: FloatArray = column("m", FRAME, "position north; null without a range")
     east_m: FloatArray = column("m", FRAME, "position east; null without a range")
@@ -77,7 +77,7 @@ class PositionAndVelocity:
 
 @dataclass(eq=False, kw_only=True)
 class FrameOrigin:
-    """The origin of the frame."""
+    """Geodetic origin of the north-east-down frame that positions are given in."""
 
     origin_lat_deg: FloatArray = column("deg", WGS84, "origin of the frame: latitude")
     origin_lon_deg: FloatArray = column("deg", WGS84, "its longitude")

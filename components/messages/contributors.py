@@ -21,22 +21,22 @@ def mask_type(sensors: int) -> type:
 
 
 def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
-    """Return the names behind bit masks, joined by ``+``."""
+    """Return for each bit mask the names of its sensors joined by ``+``."""
     if len(sensors) <= _COUNTED_BITS:  # counting was measured to be the fastest
         used = np.bincount(contributors, minlength=1)
         masks = np.flatnonzero(used)
         codes = (np.cumsum(used > 0) - 1).take(contributors)
     else:
         masks, codes = np.unique(contributors, return_inverse=True)
-    return Text(codes, tuple("+".join(names_in(int(mask), sensors)) for mask in masks))
+    return Text(codes, tuple("+".join(sensor_names_in_mask(int(mask), sensors)) for mask in masks))
 
 
 @lru_cache(maxsize=256)
-def names_in(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the names behind one bit mask."""
+def sensor_names_in_mask(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of the sensors whose bits are set in one mask."""
     return tuple(name for i, name in enumerate(sensors) if mask >> i & 1)
 
 
 def contributor_names(message: Any) -> Text:
-    """Return the names of the sensors behind each entry of a message."""
+    """Return for each entry of a message the names of its contributing sensors joined by ``+``."""
     return combination_text(message.contributors, message.sensors)

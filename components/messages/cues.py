@@ -11,7 +11,7 @@ from dsa_des.block.message import Message, column
 
 @dataclass(eq=False)
 class CueCones(PositionAndVelocity, FrameOrigin, Message):
-    """Where targets are thought to be, at each instant at which it is reported.
+    """Cones in which targets are expected, sent to sensors as cues by a tracker.
 
     A sensor carries a cone with a range on with its velocity; one without keeps its direction. The
     axis is as the ownship saw it at `state_s`; the cone holds the target until `until_s`, both in s

@@ -79,7 +79,7 @@ EXTRAS = {
 
 @dataclass(frozen=True)
 class LastingPart:
-    """An error that is forgotten with a time constant.
+    """A measurement error's part that is correlated between looks: variance, time constant.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ class LastingPart:
 
 @dataclass(frozen=True)
 class LastingError:
-    """What of a quantity's error is not new at every look; all parts are in its variance.
+    """A quantity's correlated errors, which never average out; its stated variance has them all.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ class LastingError:
 
 @dataclass(frozen=True)
 class ToldError:
-    """An error with a deviation that detections tell, Gauss-Markov with a time constant.
+    """A Gauss-Markov error whose standard deviation is reported with each detection.
 
     Parameters
     ----------
@@ -212,10 +212,11 @@ class SensorOffer:
 _OFTEN_S = 2.0
 
 
-def promises_of_looks(
+def report_interval_promises(
     period_s: float, promises: Iterable[tuple[float, float]] = ()
 ) -> tuple[tuple[float, float], ...]:
-    """Return the promises (`SensorOffer`) of a sensor with this look interval, s.
+    """Return pairs of range (m) and time (s): up to that range a target is reported again within
+    that time, 19 times in 20.
 
     `promises` are those that it makes whatever its looks. Of a sensor that looks often nothing is
     said of its looks, so that replicas may differ in their rates.
@@ -225,8 +226,8 @@ def promises_of_looks(
     return tuple((far, max(s, period_s)) for far, s in promises) or ((math.inf, period_s),)
 
 
-def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
-    """Return what sensors offer, by name, as the fusions among some producers hand it on."""
+def offers_of_fused_sensors(producers: Iterable[Any]) -> dict[str, Any]:
+    """Return the offers of all sensors that producers pass on, such as fusions, by name."""
     offers: dict[str, Any] = {}
     for producer in producers:
         if isinstance(producer.offer, dict):
@@ -234,9 +235,11 @@ def sensor_offers(producers: Iterable[Any]) -> dict[str, Any]:
     return offers
 
 
-def describe_rangeless(producers: Iterable[Any]) -> str:
-    """Return who leads to some blocks, where no sensor among them measures range; else nothing."""
-    offers = sensor_offers(producers)
+def names_of_rangeless_sensors(producers: Iterable[Any]) -> str:
+    """Return the sensors' names joined by `and` if none of them measures range; an empty string if
+    one does or none is known.
+    """
+    offers = offers_of_fused_sensors(producers)
     if not offers or any(
         not isinstance(one, SensorOffer) or one.measures_range for one in offers.values()
     ):
@@ -244,8 +247,8 @@ def describe_rangeless(producers: Iterable[Any]) -> str:
     return " and ".join(sorted(offers))
 
 
-def pose_column(name: str) -> Any:
-    """Declare one of the columns `POSE`, which belong to every detection of the scan."""
+def declare_pose_column(name: str) -> Any:
+    """Return a message column for one quantity of ownship pose, shared by a scan's detections."""
     unit, frame, meaning, _ = POSE[name]
     return column(unit, frame, meaning, of=PER_ROW, for_entries=True, default=None, kw_only=True)
 
@@ -277,7 +280,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         `pose_columns` gives those of every entry in any case.
     own_velocity : dict of (rows,), or None
         How the ownship moved (`OWN_VELOCITY`), where a sensor measures range rates; NaN at scans
-        without detections. `velocity_columns` gives it of every entry.
+        without detections. `own_velocity_columns` gives it of every entry.
     own_velocity_of_entries : dict of (entries,), or None
         The same at instants of their own.
     ticks_after : (entries,) of int, or None
@@ -315,12 +318,12 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     )
     extras: dict[str, AnyArray] = columns(EXTRAS, value=lambda m: m.extra_columns())
     roster: Roster = static()
-    own_lat_deg: FloatArray | None = pose_column("own_lat_deg")
-    own_lon_deg: FloatArray | None = pose_column("own_lon_deg")
-    own_alt_m: FloatArray | None = pose_column("own_alt_m")
-    own_heading_rad: FloatArray | None = pose_column("own_heading_rad")
-    own_pitch_rad: FloatArray | None = pose_column("own_pitch_rad")
-    own_roll_rad: FloatArray | None = pose_column("own_roll_rad")
+    own_lat_deg: FloatArray | None = declare_pose_column("own_lat_deg")
+    own_lon_deg: FloatArray | None = declare_pose_column("own_lon_deg")
+    own_alt_m: FloatArray | None = declare_pose_column("own_alt_m")
+    own_heading_rad: FloatArray | None = declare_pose_column("own_heading_rad")
+    own_pitch_rad: FloatArray | None = declare_pose_column("own_pitch_rad")
+    own_roll_rad: FloatArray | None = declare_pose_column("own_roll_rad")
     own_of_entries: dict[str, FloatArray] | None = per_entry(default=None, kw_only=True)
     own_velocity: dict[str, FloatArray] | None = columns(
         OWN_VELOCITY, of=PER_ROW, for_entries=True, default=None, kw_only=True
@@ -331,14 +334,16 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
     looks: dict[str, AnyArray] | None = per_row(default=None, kw_only=True)
 
     def tables(self) -> dict[str, Columns]:
-        """Return what is recorded: with the looks, where they are asked for."""
+        """Return the recorded tables: ``detections``, and ``looks`` where they are recorded."""
         tables = super().tables()
         for own in (self.own_of_entries, self.own_velocity_of_entries):
             tables["detections"].update(own or {})
         return tables if self.looks is None else {**tables, "looks": look_columns(self)}
 
     def repeat_rows(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
-        """Return its scans with detections of former ones: of nothing that is there now."""
+        """Return these scans filled with detections of earlier rows `source` of the message `of`;
+        those that are late become false detections without truth.
+        """
         result = super().repeat_rows(of, source, later_s)
         row = result.row_of_entries
         old = (later_s > 0.0)[row]
@@ -357,7 +362,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         return result
 
     def with_stuck_bit(self, rows: BoolArray, quantity: str, worth: float) -> Self:
-        """Return the scans with one bit set of every range, or of every azimuth, clockwise."""
+        """Return a copy with bit `worth` (m or deg) set in each range or azimuth of masked rows."""
         name, unit = "range_m", 1.0
         if quantity == "azimuth_deg":
             name, unit = "azimuth_rad", math.pi / 180.0
@@ -371,11 +376,11 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         return result
 
     def skipped_columns(self) -> dict[str, IntArray]:
-        """Return how many targets were skipped, by column."""
+        """Return each scan's skipped targets, in one column ``skipped_…`` for each reason."""
         return {f"skipped_{reason}": count for reason, count in self.skipped.items()}
 
     def extra_columns(self) -> dict[str, AnyArray]:
-        """Return the extras with ``declared``, which all detections have."""
+        """Return the extra columns by name, and ``declared``: True for all if there is no rule."""
         # A sensor without a rule declares whatever it reports: it knows of no false alarm.
         return {"declared": np.ones(len(self.target), dtype=bool), **self.extras}
 
@@ -386,8 +391,8 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         row, pose = self.row_of_entries, {name: getattr(self, name) for name in POSE}
         return {name: take_rows(v, row) for name, v in pose.items() if v is not None}
 
-    def velocity_columns(self) -> dict[str, FloatArray] | None:
-        """Return how the ownship moved at each entry, by column; None where none is known."""
+    def own_velocity_columns(self) -> dict[str, FloatArray] | None:
+        """Return the ownship's velocity at each entry, by column; None if it is not known."""
         if self.own_velocity is None:
             return self.own_velocity_of_entries
         row = self.row_of_entries
@@ -401,7 +406,7 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
 
 @dataclass(eq=False)
 class OwnOfEntries(Message):
-    """What a beam that sweeps records besides: the ownship at each entry's own instant."""
+    """More recorded columns of a sweeping beam: the ownship's pose at each detection's instant."""
 
     recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
         "detections": {

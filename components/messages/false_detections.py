@@ -10,12 +10,12 @@ from numpy.typing import ArrayLike
 from components.messages.columns import MEASURED
 from components.messages.detections import FALSE_TARGET, Detections
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.entries import offsets_of
+from dsa_des.arrays.entries import offsets_from_entry_rows
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 
 
 def sort_by_measurement(detections: Detections) -> Detections:
-    """Return a sensor's report with the detections of each scan by what was measured of them.
+    """Return the report with the detections of each scan sorted by what was measured.
 
     Nearest first, then by azimuth, elevation and confidence: the order of a roster would tell who
     is who, and that false alarms come after targets, which is which.
@@ -96,11 +96,11 @@ def add_false_detections(
 AnyDetections = TypeVar("AnyDetections", Detections, FusedDetections)
 
 
-def true_entries(message: AnyDetections) -> AnyDetections:
-    """Return the same rows without false alarms; the message itself where it has none."""
+def without_false_alarms(message: AnyDetections) -> AnyDetections:
+    """Return the message without false alarms, in the same rows; itself if it has none."""
     if np.count_nonzero(message.target < 0) == 0:
         return message
     kept = np.flatnonzero(message.target >= 0)
     true = message.reorder(kept)
-    true.offsets = offsets_of(message.row_of_entries[kept], len(message))
+    true.offsets = offsets_from_entry_rows(message.row_of_entries[kept], len(message))
     return true

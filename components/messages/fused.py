@@ -88,12 +88,12 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
             self.measured_tick = self.tick.take(self.row_of_entries)
 
     def take_rows(self, rows: slice | IntArray) -> Self:
-        """Return those of some rows, as what belongs to a message's rows."""
+        """Return the fused detections of the given message rows."""
         return self.take(rows)
 
     @classmethod
     def join_rows(cls, parts: Sequence[Self]) -> Self:
-        """Return those of all parts' rows."""
+        """Return one message with the rows of all parts, in order."""
         return cls.concatenate(parts)
 
     def pose_columns(self) -> dict[str, FloatArray]:
@@ -103,7 +103,7 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
 
 @dataclass(eq=False)
 class FusedWithPose(FusedDetections):
-    """The same where navigation errs: the ownship's believed pose is recorded beside each line."""
+    """Fused detections of a scene with navigation errors, recorded with the believed pose."""
 
     own_of_entries: dict[str, FloatArray] | None = columns(
         ERRING_POSE, value=lambda m: m.pose_columns(), default=None, kw_only=True

@@ -26,7 +26,7 @@ class AllFlights(Protocol):
 
     @property
     def traffic(self) -> object:
-        """The same for all flights of one traffic, whatever came since."""
+        """The same object for all `AllFlights` of a traffic block, whichever manoeuvres known."""
 
     def states(
         self,
@@ -37,8 +37,7 @@ class AllFlights(Protocol):
         ahead_s: FloatArray | float,
         viewer: int,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of the viewing platform in some runs, and of its targets (`columns` of its
-        roster).
+        """Return the states of the viewing platform and of its targets in the given runs.
 
         Times are (rows, 1) or (rows, columns), and so are the states of who looks; `known` (...,
         platforms) is how many manoeuvres of each count. `ahead_s` is how long after what is known
@@ -46,13 +45,13 @@ class AllFlights(Protocol):
         publication. `viewer` is the target from which the others are seen, -1 for the ownship.
         """
 
-    def own_states(
+    def viewer_states(
         self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
     ) -> TrajectoryState:
-        """Return states of who looks in runs (n,), likewise, each at a time (n,) of its own."""
+        """Return the states of the viewing platform in runs (n,), each at its own time (n,)."""
 
-    def once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
-        """Return what was made under a name of equal arrays, or make it; the last one is kept."""
+    def compute_once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+        """Return what `name` keeps if arrays `of` are as last time, else `make` and keep it."""
 
 
 class KnownFlights:
@@ -81,34 +80,36 @@ class KnownFlights:
         """Return what is seen of targets at times (rows, 1) or (rows, columns).
 
         The states of who looks, of the times' shape, and of the targets (rows, columns); or what
-        `seen_by` makes of them, arrays by name.
+        `view_through` makes of them, arrays by name.
         """
         run, known = self.run[:, np.newaxis], self.known[:, np.newaxis]
         return self._states(run, known, columns, time_s, 0.0)
 
-    def each(
+    def columns_of_single_targets(
         self, row: IntArray, column: IntArray, time_s: FloatArray, ahead_s: FloatArray
     ) -> Mapping[str, AnyArray]:
-        """Return what is seen of single targets, each as its own row knows it, arrays (n,) by name.
+        """Return what is observed of single targets, one per given row, as arrays (n,) by name.
 
         Row of the message, index of the target in the roster and times are (n,), too; see
         `AllFlights.states`.
         """
         run, known = self.run[row][np.newaxis], self.known[row][np.newaxis]
-        return _flat(self._states(run, known, column, time_s[np.newaxis], ahead_s[np.newaxis]))
+        return _flatten_single_row(
+            self._states(run, known, column, time_s[np.newaxis], ahead_s[np.newaxis])
+        )
 
-    def ownship_states(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return the states of who looks as some rows (n,) know it, at a time (n,) of each."""
-        return self.flights.own_states(self.run[row], self.known[row], time_s, self._viewer)
+    def viewer_states(self, row: IntArray, time_s: FloatArray) -> TrajectoryState:
+        """Return the viewing platform's states by the flights known at each row, at times (n,)."""
+        return self.flights.viewer_states(self.run[row], self.known[row], time_s, self._viewer)
 
     @property
     def viewer(self) -> int:
-        """The target from which they are seen, -1 for the ownship."""
+        """Index of the target that the flights are seen from; -1 for the ownship."""
         return self._viewer
 
-    def once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
-        """Return what is the same for whoever looks, made once; see `AllFlights.once`."""
-        return self.flights.once(name, of, make)
+    def compute_once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+        """Return a value computed once for all viewing platforms (`AllFlights.compute_once`)."""
+        return self.flights.compute_once(name, of, make)
 
     def _states(
         self, run: IntArray, known: IntArray, columns: IntArray, time_s: FloatArray, ahead_s: Any
@@ -120,11 +121,13 @@ class KnownFlights:
         return states
 
     def seen_from(self, viewer: int) -> KnownFlights:
-        """Return the same for who looks from a target."""
+        """Return the same flights seen from another target, by its index; -1 is the ownship."""
         return self._replace(self.run, self.known, viewer=viewer)
 
-    def seen_by(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
-        """Return the same for who looks at the states through `seen`, which takes both."""
+    def view_through(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
+        """Return the same flights with `seen` applied to their states: it gets those of viewer and
+        targets and returns columns.
+        """
         return self._replace(self.run, self.known, seen=(*self._seen, seen))
 
     def take_rows(self, rows: slice | IntArray) -> KnownFlights:
@@ -149,8 +152,8 @@ class KnownFlights:
         return newest._replace(run, known)
 
 
-def _flat(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
-    """Return the single row of what is seen of targets; what is in tables, with their names."""
+def _flatten_single_row(seen: Mapping[str, Any]) -> Mapping[str, AnyArray]:
+    """Return each array's first row by name; in nested tables prefixed by the table's name."""
     flat = {name: values[0] for name, values in seen.items() if isinstance(values, np.ndarray)}
     for table, columns in seen.items():
         if isinstance(columns, Mapping):

@@ -7,9 +7,16 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.messages.columns import TrueLine
-from dsa_des.arrays.entries import entries_of
+from dsa_des.arrays.entries import select_entries
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import Column, Columns, Message, Text, columns_of, instants_of
+from dsa_des.block.message import (
+    Column,
+    Columns,
+    Message,
+    Text,
+    columns_of_dataclass,
+    instant_columns,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,12 +37,12 @@ class Looks:
 
     def take_rows(self, rows: slice | IntArray) -> Self:
         """Return the looks of some rows."""
-        offsets, which = entries_of(self.offsets, rows)
+        offsets, which = select_entries(self.offsets, rows)
         return type(self)(offsets, self.sensor[which], self.age_ticks[which], self.pose[:, which])
 
     @classmethod
     def join_rows(cls, parts: Sequence[Self]) -> Self:
-        """Return the looks of all parts' rows."""
+        """Return the looks of the rows of all parts, in order."""
         counts = [np.diff(part.offsets) for part in parts]
         joined = {
             item.name: np.concatenate([getattr(part, item.name) for part in parts], axis=-1)
@@ -51,7 +58,7 @@ _NUMBERS = (*_TRUE, "confidence", "snr_db", "detection_probability", "pixels")
 
 @dataclass(eq=False)
 class EveryLook(Message):
-    """What a sensor records where looks are asked for; it goes over no wire."""
+    """Recorded table of all of a sensor's looks, detected or not; not sent to other blocks."""
 
     recorded: ClassVar[Mapping[str, Mapping[str, Column]]] = {
         "looks": {
@@ -61,7 +68,7 @@ class EveryLook(Message):
                 "", "", "whether its physics was evaluated: all else is null without", "bool"
             ),
             "detected": Column("", "", "whether it was detected", "bool"),
-            **columns_of(TrueLine),
+            **columns_of_dataclass(TrueLine),
             "confidence": Column(
                 "dB or signature", "", "margin that decided, by the kind of sensor"
             ),
@@ -76,8 +83,8 @@ class EveryLook(Message):
     }
 
 
-def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
-    """Return a sensor's looks at all targets, (scans, targets); NaN where not evaluated."""
+def spread_looks(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
+    """Return cells and look as arrays (scans, targets) by name; NaN or False if not evaluated."""
     shape = (scans, len(cells.roster))
     cell = (cells.row, cells.target)
     looks: dict[str, AnyArray] = {}
@@ -99,11 +106,11 @@ def looks_of(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
 
 
 def look_columns(detections: Any) -> Columns:
-    """Return the rows of the looks of a report: every target at every scan."""
+    """Return the recorded table of looks, with one row per scan and target."""
     count = len(detections.roster)
     row = np.repeat(np.arange(len(detections)), count)
     columns: Columns = {
-        **instants_of(detections, row),
+        **instant_columns(detections, row),
         "scan": detections.scan.take(row),
         "target": Text(np.tile(np.arange(count), len(detections)), detections.roster.names),
     }

@@ -61,20 +61,20 @@ class Reach:
 
     @property
     def width_rad(self) -> tuple[float, float]:
-        """Width of the field of view in azimuth, (0, 2 pi], and in elevation."""
+        """Return the field of view's widths in azimuth, in (0, 2 pi], and in elevation, rad."""
         low, high = self.elevation_rad
         return min(sector_width_rad(*self.azimuth_rad), TWO_PI), high - low
 
     @property
     def steepest_rad(self) -> float:
-        """Largest size of an elevation in body axes that is looked at."""
+        """Largest absolute elevation in body axes inside the field of view, rad."""
         return max(abs(angle) for angle in self.elevation_rad)
 
     @cached_property
     def _field(self) -> FieldOfView:
         return _field_of_view(self.azimuth_rad, self.elevation_rad)
 
-    def decide(
+    def skip_reasons(
         self,
         body_azimuth_rad: FloatArray,
         body_elevation_rad: FloatArray,
@@ -82,7 +82,7 @@ class Reach:
         present: BoolArray,
         hidden: BoolArray | None = None,
     ) -> ReasonArray:
-        """Return the reason why each target is skipped, or EVALUATE.
+        """Return target codes: `EVALUATE`, or off, field of view, range, hidden, absent (skips).
 
         All arrays are of one shape and finite, the azimuth in (-pi, pi]; `hidden` says whether the
         Earth or its ground stands before the target, by default nowhere.
@@ -131,7 +131,7 @@ class FarthestLook:
 
 
 def farthest_look(requests: Iterable[object]) -> FarthestLook:
-    """Return the farthest of what consumers ask for; who does not say asks for everything."""
+    """Return a request that covers all consumers'; one without a range makes it unlimited."""
     looks = [FarthestLook(0.0, ())]
     for request in requests:
         if isinstance(request, FarthestLook):
@@ -160,14 +160,14 @@ def farthest_look(requests: Iterable[object]) -> FarthestLook:
 
 @dataclass(eq=False)
 class Decision:
-    """The decision for one sensor over the rows of a message."""
+    """The reasons why one sensor skips targets, for the rows of a message."""
 
     rows: IntArray  # (scans,): the message rows at which the sensor scans, ascending
     reason: ReasonArray  # (scans, targets)
     count: int  # Rows of the message
 
     def reasons_at(self, rows: IntArray) -> ReasonArray | None:
-        """Return the reasons at some message rows; None where the sensor does not scan at one."""
+        """Return reason codes (rows, targets) at some rows; None if one of them is not a scan."""
         own = self.rows
         if rows is own or (len(rows) == len(own) and bool((rows == own).all())):
             return self.reason
@@ -182,13 +182,13 @@ class Decision:
         return scan
 
     def take_rows(self, rows: slice | IntArray) -> "Decision":
-        """Return the decision for some of the rows."""
+        """Return the decision for some message rows only."""
         scan = self._scan_of_row[rows]
         kept = np.flatnonzero(scan >= 0)
         return Decision(kept, self.reason[scan[kept]], len(scan))
 
     def widen(self, columns: IntArray, width: int) -> "Decision":
-        """Return the decision over `width` targets, ours in these `columns`, the others absent."""
+        """Return the decision over `width` targets: these at `columns`, all others absent."""
         reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
         reason[:, columns] = self.reason
         return Decision(self.rows, reason, self.count)

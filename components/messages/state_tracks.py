@@ -21,8 +21,8 @@ STALE_S = 30.0
 HELD = STATUSES[CONFIRMED], STATUSES[COASTED]
 
 
-def is_held(status: Text) -> BoolArray:
-    """Return which rows of a column of statuses are of confirmed or coasted tracks."""
+def is_confirmed_or_coasted(status: Text) -> BoolArray:
+    """Return a mask of the rows (True) whose track status is confirmed or coasted."""
     return np.isin(status.codes, [k for k, name in enumerate(status.names) if name in HELD])
 
 
@@ -35,8 +35,8 @@ COVARIANCE = {
 }
 
 
-def full_covariance(columns: Mapping[str, Any], rows: Any, size: int = 6) -> FloatArray:
-    """Return the covariances of some rows as matrices, (size, size, rows), from `COVARIANCE`."""
+def covariance_matrices(columns: Mapping[str, Any], rows: Any, size: int = 6) -> FloatArray:
+    """Return some rows' covariances, (size, size, rows), symmetric, from columns `COVARIANCE`."""
     return np.stack(
         [
             np.stack([columns[COVARIANCE[min(i, j), max(i, j)]][rows] for j in range(size)])

@@ -9,14 +9,14 @@ import numpy as np
 
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import PER_ROW, Message, column, offsets_of
+from dsa_des.block.message import PER_ROW, Message, column, offsets_from_entry_rows
 
 #: Slower turns are none: at 340 m/s their radius is beyond the 200 km that flights can have.
 SLOWEST_TURN_DEG_S = 0.1
 
 
 class Manoeuvre(NamedTuple):
-    """One manoeuvre: a turn, a climb or descent, or another speed; what is not changed is 0.
+    """One commanded turn, climb, descent or change of speed; fields not commanded are 0.
 
     Parameters
     ----------
@@ -114,48 +114,51 @@ class Manoeuvres(Message):
     def __post_init__(self) -> None:
         """Fill in what is not changed."""
         super().__post_init__()
-        for name in self.parts()[2:]:
+        for name in self.manoeuvre_field_names()[2:]:
             if getattr(self, name) is None:
                 setattr(self, name, np.zeros(len(self.tick)))
 
     @classmethod
     def of(cls, ticks: Sequence[int], manoeuvres: Sequence[Manoeuvre]) -> Self:
-        """Return the message of manoeuvres, each at an instant of its own."""
+        """Return the message with one manoeuvre per row, at the given ticks."""
         parts = np.array(manoeuvres, dtype=np.float64).reshape(-1, len(Manoeuvre._fields)).T
         given: dict[str, Any] = dict(zip(Manoeuvre._fields, parts, strict=True))
         return cls(
-            np.array(ticks, dtype=np.int64), **{name: given[name].copy() for name in cls.parts()}
+            np.array(ticks, dtype=np.int64),
+            **{name: given[name].copy() for name in cls.manoeuvre_field_names()},
         )
 
     @classmethod
-    def parts(cls) -> list[str]:
-        """Return which parts of a `Manoeuvre` it holds."""
+    def manoeuvre_field_names(cls) -> list[str]:
+        """Return the names of those fields of `Manoeuvre` that this message has."""
         return [name for name in Manoeuvre._fields if name in cls.__dataclass_fields__]
 
-    def manoeuvres(self) -> FloatArray:
-        """Return a row (fields of `Manoeuvre`,) of each row."""
-        none, given = np.full(len(self.tick), math.nan), self.parts()
+    def manoeuvre_array(self) -> FloatArray:
+        """Return an array (rows, fields of `Manoeuvre`), NaN for fields the message lacks."""
+        none, given = np.full(len(self.tick), math.nan), self.manoeuvre_field_names()
         parts = [getattr(self, name) if name in given else none for name in Manoeuvre._fields]
         return np.stack(parts, axis=-1)
 
     @classmethod
     def at_rows(cls, instants: RunTicks, manoeuvres: Mapping[int, Manoeuvre]) -> Self | None:
-        """Return manoeuvres at some instants, by these' positions; None without any."""
+        """Return the message of manoeuvres at positions in `instants`; None if there are none."""
         rows = sorted(manoeuvres)
         if not rows:
             return None
         some = instants.take(np.array(rows))
-        return cls.of(some.tick.tolist(), [manoeuvres[row] for row in rows]).of_runs(some.run)
+        return cls.of(some.tick.tolist(), [manoeuvres[row] for row in rows]).with_runs(some.run)
 
     @classmethod
     def make_initial(cls, values: Mapping[str, object]) -> Self:
-        """Refuse: before the first manoeuvre there is none, ``holds = "nothing"``."""
+        """Raise ValueError: a scene cannot state a manoeuvre before the first, only ``holds =
+        'nothing'``.
+        """
         raise ValueError("no manoeuvre can be written in a scene; allowed: 'nothing'")
 
 
 @dataclass(eq=False)
 class Velocities(Manoeuvres):
-    """Velocities that a multirotor is to fly, with the acceleration by which it comes to them."""
+    """Velocities that a multirotor is commanded to fly, and the acceleration to reach them."""
 
     velocity_east_mps: FloatArray = column(
         "m/s", "", "commanded velocity over the ground, east", of=PER_ROW, default=None
@@ -192,7 +195,7 @@ class ChosenSides(Message):
     def at_rows(
         cls, instants: RunTicks, address: int, side: IntArray, row: IntArray, meant_for: IntArray
     ) -> Self | None:
-        """Return the sides chosen at some instants (0: none), each for whom some rows name.
+        """Return the message of sides other than 0 at positions in `instants`; None if none.
 
         None without any.
         """
@@ -201,7 +204,7 @@ class ChosenSides(Message):
         if not pairs.size:
             return None
         rows, line = np.unique(pairs[0], return_inverse=True)
-        some, offsets = instants.take(rows), offsets_of(line, len(rows))
+        some, offsets = instants.take(rows), offsets_from_entry_rows(line, len(rows))
         return cls(
             some.tick, offsets, np.full(len(line), address), side[pairs[0]], pairs[1], run=some.run
         )

@@ -21,7 +21,7 @@ from components.geometry import (
 from components.messages.columns import OWN_NED, TURNED, WGS84
 from components.messages.known_flights import KnownFlights
 from components.messages.reach import Decision
-from dsa_des.arrays.run_ticks import is_single_run
+from dsa_des.arrays.run_ticks import is_shared_single_run
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Columns, Message, Text, per_row, static
 
@@ -59,7 +59,7 @@ class TrueStates(Message):
 
 
 def truth_columns(states: Any) -> Columns:
-    """Return the ownship and every target that is there at each instant of a message.
+    """Return the recorded truth: a row each for ownship and present targets at every instant.
 
     At each instant the ownship first (its ``target`` is null), then the targets as the roster has
     them, whatever the arrays of `states` hold. Velocities are those of the path in the aircraft's
@@ -70,7 +70,7 @@ def truth_columns(states: Any) -> Columns:
     count = len(states.roster)
     step = max(1, _AT_ONCE // (1 + count))
     parts = [
-        _part(
+        _truth_of_rows(
             states.true_flights.take_rows(rows), states.tick[rows], states.run_time_s[rows], count
         )
         for rows in (slice(i, i + step) for i in range(0, len(states), step))
@@ -78,7 +78,7 @@ def truth_columns(states: Any) -> Columns:
     columns: Columns = {
         name: np.concatenate([part[name] for part in parts]) for name in ("tick", *_NUMBERS)
     }
-    if not is_single_run(states.run):
+    if not is_shared_single_run(states.run):
         counts = np.concatenate([part["counts"] for part in parts])
         columns["replica"] = np.repeat(states.run, counts)
     who = np.concatenate([part["who"] for part in parts])
@@ -86,7 +86,7 @@ def truth_columns(states: Any) -> Columns:
     return columns
 
 
-def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[str, Any]:
+def _truth_of_rows(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[str, Any]:
     columns, rows = np.arange(count), len(time_s)
     # All three instants are asked for at once.
     times_s = np.concatenate([time_s, time_s + STEP_S, time_s - STEP_S])
@@ -96,7 +96,7 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
         {name: values[first : first + rows] for name, values in states.items()}
         for first in (0, rows, 2 * rows)
     )
-    velocity = _velocity(flights, columns, time_s, state, after, before)
+    velocity = _ned_velocities(flights, columns, time_s, state, after, before)
     row, column = np.nonzero(state["present"])
     return {
         "tick": tick[row],
@@ -111,12 +111,12 @@ def _part(flights: Any, tick: IntArray, time_s: FloatArray, count: int) -> dict[
 _State = dict[str, Any]
 
 
-def _velocity(
+def _ned_velocities(
     flights: Any, columns: IntArray, time_s: FloatArray, here: _State, after: _State, before: _State
 ) -> list[FloatArray]:
-    """Return the velocity north, east and down of everybody at each time, (rows, 1 + targets)."""
+    """Return velocities north, east, down of ownship and targets, each (rows, 1 + targets), m/s."""
     there_after, there_before = after["present"], before["present"]
-    way_after, way_before = _way(here, after), _way(here, before)
+    way_after, way_before = _ned_offsets(here, after), _ned_offsets(here, before)
     velocity = (way_after - way_before) / (2.0 * STEP_S)
     one_sided = here["present"] & ~(there_after & there_before)
     rows = np.flatnonzero(one_sided.any(axis=1))
@@ -128,7 +128,7 @@ def _velocity(
             (way_before, there_before, -STEP_S),
         ):
             far = _with_ownship(part(columns, (time_s[rows] + 2.0 * step_s)[:, np.newaxis]))
-            slope = (4.0 * near[:, rows] - _way(here, far)) / (2.0 * step_s)
+            slope = (4.0 * near[:, rows] - _ned_offsets(here, far)) / (2.0 * step_s)
             fits = one_sided[rows] & there[rows] & far["present"]
             velocity[:, rows] = np.where(fits, slope, velocity[:, rows])
             one_sided[rows] &= ~fits
@@ -136,8 +136,8 @@ def _velocity(
     return list(velocity)
 
 
-def _way(here: _State, there: _State) -> FloatArray:
-    """Return where everybody is in one state, north, east and down of where they are in another."""
+def _ned_offsets(here: _State, there: _State) -> FloatArray:
+    """Return the positions in `there` relative to those in `here`: north, east and down, m."""
     ends = [*(here[name] for name in POSITION_FIELDS), *(there[name] for name in POSITION_FIELDS)]
     return np.stack(line_of_sight_ned(*ends, validate=False))
 
@@ -218,9 +218,7 @@ class TrafficStates(Message):
         )
 
     def seen_from(self, platform: str) -> Self:
-        """Return the states as who looks from a platform has them: it is the one whose own they are
-        and the ownship is in its place.
-        """
+        """Return the states seen from another platform, which swaps places with the ownship."""
         if platform == self.roster.own_name:
             return self
         target = self.roster.names.index(platform)
@@ -240,17 +238,17 @@ class TrafficStates(Message):
         return seen
 
     def check(self) -> None:
-        """Refuse arrays without a column for each of the targets, too."""
+        """Raise ValueError if an array over targets has not one column for each target."""
         super().check()
-        check_columns(self)
+        check_target_columns(self)
 
     def tables(self) -> dict[str, Columns]:
-        """Return the table of the truth where it is recorded."""
+        """Return the table ``truth`` if the truth is recorded; else an empty mapping."""
         return {} if self.true_flights is None else {"truth": truth_columns(self)}
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
-        """Return the rows of all parts, over the targets of any of them."""
+        """Return one message with the rows of all parts, over the union of their targets."""
         return super().concatenate(widen_to_union(parts))
 
 
@@ -313,29 +311,29 @@ class RelativeTargets(Message):
     joins_static = frozenset({"columns"})
 
     @property
-    def picture_tick(self) -> IntArray:
-        """When the aircraft were where each row has them."""
+    def position_ticks(self) -> IntArray:
+        """Tick at which the aircraft had the positions in each row, (rows,)."""
         return self.tick if self.state_tick is None else self.state_tick
 
     def check(self) -> None:
-        """Refuse arrays without a column for each of the targets, too."""
+        """Raise ValueError if an array over targets has not one column for each target."""
         super().check()
-        check_columns(self)
+        check_target_columns(self)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
-        """Return the rows of all parts, over the targets of any of them."""
+        """Return one message with the rows of all parts, over the union of their targets."""
         return super().concatenate(widen_to_union(parts))
 
 
 @dataclass(eq=False)
 class GatedTargets(RelativeTargets):
-    """Relative targets with each sensor's simulation decision, by its name (thesis §3.4)."""
+    """Relative targets, with each sensor's decision which it skips, by name (thesis §3.4)."""
 
     decisions: dict[str, Decision] = per_row()
 
 
-def check_columns(message: Any) -> None:
+def check_target_columns(message: Any) -> None:
     """Raise ValueError unless the arrays over targets have as many columns as there are targets."""
     count = len(message.columns)
     for name, values in vars(message).items():
@@ -379,7 +377,7 @@ def _widen(part: Any, columns: IntArray) -> Any:
 
 
 def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
-    """Return the ownship's velocity over ground (north, east, down, m/s) at times of some rows.
+    """Return the ownship's ground velocity (north, east, down) at rows and times, (3, n), m/s.
 
     From positions 1/64 s before and after, of which one is replaced by the position itself where
     the flight begins or ends between; NaN where no flights are known.
@@ -387,7 +385,7 @@ def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) ->
     if targets.revisit is None or not len(targets.roster) or not len(row):
         return np.full((3, len(row)), np.nan)
     at_s = np.concatenate([time_s, time_s - _OWN_STEP_S, time_s + _OWN_STEP_S])
-    own = targets.revisit.ownship_states(np.tile(row, 3), at_s)
+    own = targets.revisit.viewer_states(np.tile(row, 3), at_s)
     place = [getattr(own, name) for name in POSITION_FIELDS]
     here = [np.tile(values[: len(row)], 2) for values in place]
     there = own.present[len(row) :]

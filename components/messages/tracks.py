@@ -16,7 +16,7 @@ from dsa_des.block.message import Message, column, columns, per_entry, static
 
 @dataclass(eq=False)
 class Tracks(MeasuredLine, Message):
-    """What a tracker holds of each target, at each instant it was updated.
+    """The tracks of a tracker after each update, one entry per target.
 
     The held line of sight is in the ownship's body axes.
 
@@ -64,6 +64,6 @@ class Tracks(MeasuredLine, Message):
 
 @dataclass(eq=False)
 class TracksWithPose(Tracks):
-    """The same where navigation errs: with the ownship's believed pose when each was measured."""
+    """Tracks of a scene with navigation errors, with the believed pose at each measurement."""
 
     own_of_entries: dict[str, FloatArray] = columns(ERRING_POSE, kw_only=True)

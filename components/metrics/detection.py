@@ -13,20 +13,20 @@ from components.metrics.rows import (
     SensorMetricParameters,
     TargetMetric,
     column_at_rows,
-    earliest,
-    first_of_targets,
+    earliest_target,
+    first_rows_of_targets,
     is_at_start,
     is_named,
     is_of_target,
+    left_censoring_text,
+    pick_target_by_replica,
+    pick_targets,
     scan_time_s,
-    sensors_of,
+    sensors_to_measure,
     share_columns,
-    start_or_never,
-    values_of_target,
-    values_of_targets,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.replicas.times_out import blocks_with_outages, outage_times_of_replicas
+from dsa_des.replicas.outage_times import blocks_with_outages, outage_times_of_replicas
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import (
     EVENT,
@@ -40,7 +40,7 @@ from dsa_des.studies.metric import (
 )
 
 ANY = "any"
-#: Columns of detections that `declarations` needs.
+#: Columns of detections that `first_declarations` needs.
 DECLARED = {"detections": ("block", "target", "time_s", "true_range_m", "declared", "scan")}
 _ROWS = ("block", "target", "time_s", "true_range_m")
 
@@ -54,7 +54,7 @@ class FirstDetection(TargetMetric):
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
         fusions = blocks_recording(scene, FUSED)
-        self.names = sensors_of(scene, parameters.sensors, [FUSED] if fusions else [])
+        self.names = sensors_to_measure(scene, parameters.sensors, [FUSED] if fusions else [])
         self.fusion = fusions[0] if fusions else None
         #: Delay (s) from each block to the fusion.
         self.delay_s: dict[str, float] = {}
@@ -64,7 +64,7 @@ class FirstDetection(TargetMetric):
             self.delay_s = {wire.source: float(wire.total_delay_s) for wire in wires}
 
     def results(self) -> list[Result]:
-        """Return three results per sensor."""
+        """Return definitions per sensor: if, when and at what range it first reports the target."""
         results = []
         for name in self.names:
             label = "the fusion" if name == FUSED else name
@@ -90,10 +90,10 @@ class FirstDetection(TargetMetric):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the first report of every replica."""
+        """Return by replica whether, when (s), at what range (m) each sensor first reports."""
         values: dict[str, AnyArray] = {}
         for name in self.names:
-            time_s, range_m = first_report(group, name, self.p.target)
+            time_s, range_m = first_report_time_and_range(group, name, self.p.target)
             values[f"detected.{name}"] = (~np.isnan(time_s)).astype(float)
             values[f"first_detection_time_s.{name}"] = time_s
             values[f"first_detection_range_m.{name}"] = range_m
@@ -102,14 +102,14 @@ class FirstDetection(TargetMetric):
                 if name == FUSED
                 else is_at_start(group, name, time_s)
             )
-            values[f"first_detection_cut_off.{name}"] = start_or_never(cut, time_s)
+            values[f"first_detection_cut_off.{name}"] = left_censoring_text(cut, time_s)
         return values
 
     def _is_fused_at_start(self, group: Group) -> BoolArray:
-        """Return whether a replica's first fused report is of what a sensor's first scan saw."""
+        """Return by replica whether its first fused report rests on a sensor's first scan."""
         columns: Any = group.tables[FUSED]
         rows = np.flatnonzero(is_of_target(columns, self.p.target))
-        first = first_row(columns, rows, len(group))
+        first = row_of_first_report(columns, rows, len(group))
         sensors = columns["sensors"]
         code = np.where(first >= 0, sensors.codes[first], -1) if len(rows) else first
         result = np.zeros(len(group), dtype=bool)
@@ -123,8 +123,8 @@ class FirstDetection(TargetMetric):
         return result
 
 
-def first_report(group: Group, name: str, target: str | None) -> list[FloatArray]:
-    """Return time (s) and true range (m) of a sensor's first report, or the fusion's ("fused").
+def first_report_time_and_range(group: Group, name: str, target: str | None) -> list[FloatArray]:
+    """Return time (s), true range (m) of replicas' first report by a sensor or `fused`, or NaN.
 
     Of several targets reported at that instant the nearest counts.
     """
@@ -132,23 +132,23 @@ def first_report(group: Group, name: str, target: str | None) -> list[FloatArray
     rows = is_of_target(columns, target)
     if name != FUSED:
         rows &= is_named(columns["block"], name)
-    first = first_row(columns, np.flatnonzero(rows), len(group))
+    first = row_of_first_report(columns, np.flatnonzero(rows), len(group))
     return [
         column_at_rows(columns, "time_s", first),
         column_at_rows(columns, "true_range_m", first),
     ]
 
 
-def first_row(columns: Any, rows: IntArray, count: int) -> IntArray:
+def row_of_first_report(columns: Any, rows: IntArray, count: int) -> IntArray:
     """Return the row of each replica's first report of any target, -1 where it has none."""
-    each = first_of_targets(columns, rows, count)
+    each = first_rows_of_targets(columns, rows, count)
     when_s, range_m = (column_at_rows(columns, name, each) for name in ("time_s", "true_range_m"))
-    which = earliest(when_s, range_m)
-    return np.where(which < 0, -1, values_of_target(each, which))
+    which = earliest_target(when_s, range_m)
+    return np.where(which < 0, -1, pick_target_by_replica(each, which))
 
 
 class DetectionShare(TargetMetric):
-    """Share of the looks at targets inside a sensor's reach that detect.
+    """Share of a sensor's looks at targets in its reach in which it detects them.
 
     Of a sensor that fails, or that changes switch off, also the share of the run that it was out.
     """
@@ -160,10 +160,10 @@ class DetectionShare(TargetMetric):
         super().__init__(parameters, scene)
         if parameters.target is not None:
             raise ValueError("target: looks are counted over all targets; leave it out")
-        self.names = sensors_of(scene, parameters.sensors)
+        self.names = sensors_to_measure(scene, parameters.sensors)
 
     def results(self) -> list[Result]:
-        """Return one share per sensor, and how long each that may be out was."""
+        """Return a share's definition per sensor, and the time out for those that may fail."""
         meaning = "detections per look at a target in reach"
         shares = [Result(f"detection_share.{name}", SHARE, meaning) for name in self.names]
         out = sorted(set(self.names).intersection(blocks_with_outages(self.scene)))
@@ -171,7 +171,7 @@ class DetectionShare(TargetMetric):
         return [*shares, *(Result(f"out_share.{name}", FRACTION, meaning) for name in out)]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Count looks and detections of every replica."""
+        """Return each replica's share of looks detecting and, if sensors may fail, of time out."""
         scans, detections = group.tables["scans"], group.tables["detections"]
         values: dict[str, FloatArray] = {}
         for name in self.names:
@@ -224,7 +224,7 @@ class Declaration(TargetMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self.sensors = sensors_of(scene, parameters.sensors)
+        self.sensors = sensors_to_measure(scene, parameters.sensors)
         self.names = [*self.sensors, ANY]
 
     def results(self) -> list[Result]:
@@ -258,18 +258,18 @@ class Declaration(TargetMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return the first declaration of every replica."""
         values: dict[str, AnyArray] = {}
-        for name, each in declarations(group, self.p, self.sensors).items():
-            first = each.select_target(earliest(each.time_s, each.range_m))
+        for name, each in first_declarations(group, self.p, self.sensors).items():
+            first = each.select_target(earliest_target(each.time_s, each.range_m))
             values[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
             values[f"declaration_time_s.{name}"] = first.time_s
             values[f"declaration_range_m.{name}"] = first.range_m
             values[f"declaration_delay_s.{name}"] = first.time_s - first.seen_s
-            cut = start_or_never(first.at_start, first.time_s)
+            cut = left_censoring_text(first.at_start, first.time_s)
             values[f"declaration_cut_off.{name}"] = cut
         return values
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
-        """Return scan period × (m - 1): the delay where every scan detects."""
+        """Return scan period × (m - 1), s: from first detection to declaration if all detect."""
         values: dict[str, float] = {}
         for name in self.sensors:
             parameters = scene.blocks[name].parameters
@@ -294,34 +294,34 @@ class Declared(NamedTuple):
     seen_at_start: BoolArray
 
     def select_target(self, target: IntArray) -> "Declared":
-        """Return what is known of one target of each replica (index, -1 for none)."""
-        return Declared(*(values_of_target(values, target) for values in self))
+        """Return one target's first declaration in each replica (target index; -1: NaN)."""
+        return Declared(*(pick_target_by_replica(values, target) for values in self))
 
 
-def declarations(
+def first_declarations(
     group: Group,
     parameters: DeclarationParameters,
     sensors: list[str],
     targets: Sequence[str] | None = None,
 ) -> dict[str, Declared]:
-    """Return sensor (or "any") → its first declarations of each target.
+    """Return each target's first declarations by sensor name, and by any sensor under `any`.
 
     Targets are those named, or those of the recorded column in its order.
     """
     key = ("declarations", parameters.m, parameters.n, parameters.target, tuple(sensors))
-    known = group.cached(key, lambda: _declarations(group, parameters, sensors))
+    known = group.cached(key, lambda: _first_declarations(group, parameters, sensors))
     if targets is None:
         return known
     columns: Any = group.tables["detections"]
     index = {name: k for k, name in enumerate(columns["target"].names)}
     wanted = np.array([index.get(name, -1) for name in targets], dtype=np.int64)
     return {
-        name: Declared(*(values_of_targets(values, wanted) for values in each))
+        name: Declared(*(pick_targets(values, wanted) for values in each))
         for name, each in known.items()
     }
 
 
-def _declarations(
+def _first_declarations(
     group: Group, parameters: DeclarationParameters, sensors: list[str]
 ) -> dict[str, Declared]:
     columns: Any = group.tables["detections"]
@@ -333,16 +333,16 @@ def _declarations(
         if parameters.m is None or parameters.n is None:
             declared = columns["declared"][rows].astype(bool)
         else:
-            declared = _m_of_n(
+            declared = _completes_m_of_n(
                 columns["replica"][rows],
                 columns["target"].codes[rows],
                 columns["scan"][rows],
                 parameters.m,
                 parameters.n,
             )
-        first = first_of_targets(columns, rows[declared], count)
+        first = first_rows_of_targets(columns, rows[declared], count)
         time_s = column_at_rows(columns, "time_s", first)
-        seen_s = column_at_rows(columns, "time_s", first_of_targets(columns, rows, count))
+        seen_s = column_at_rows(columns, "time_s", first_rows_of_targets(columns, rows, count))
         scans = detections_needed(parameters.m, group.scene, name)
         result[name] = Declared(
             time_s,
@@ -352,17 +352,17 @@ def _declarations(
             is_at_start(group, name, seen_s),
         )
     if result:
-        result[ANY] = _earliest(list(result.values()))
+        result[ANY] = _earliest_of_sensors(list(result.values()))
     return result
 
 
 def detections_needed(m: int | None, scene: Scene, name: str) -> int:
-    """Return how many detections declare: `m`, or what the sensor's own rule says."""
+    """Return how many detections declare: `m` if given, else the sensor's ``declare_m``, or 1."""
     return int(m or getattr(scene.blocks[name].parameters, "declare_m", None) or 1)
 
 
-def _earliest(each: list[Declared]) -> Declared:
-    """Return the first declaration, and the first detection, of each target by any sensor."""
+def _earliest_of_sensors(each: list[Declared]) -> Declared:
+    """Return each replica's and target's earliest declaration and detection by any sensor."""
     time_s, range_m, at_start, seen_s, seen_at_start = map(np.array, zip(*each, strict=True))
 
     def of_first(time_s: AnyArray, *values: AnyArray) -> Iterator[AnyArray]:
@@ -372,8 +372,8 @@ def _earliest(each: list[Declared]) -> Declared:
     return Declared(*of_first(time_s, range_m, at_start), *of_first(seen_s, seen_at_start))
 
 
-def _m_of_n(replica: IntArray, target: IntArray, scan: IntArray, m: int, n: int) -> Any:
-    """Return at which detections a target has m of them within n consecutive scans."""
+def _completes_m_of_n(replica: IntArray, target: IntArray, scan: IntArray, m: int, n: int) -> Any:
+    """Return a mask, True for detections that complete m within n consecutive scans."""
     order = np.lexsort((scan, target, replica))
     declared = np.zeros(len(order), dtype=bool)
     if len(order) >= m:

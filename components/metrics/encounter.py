@@ -13,9 +13,9 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.detection import ANY, DECLARED, DeclarationParameters, declarations
-from components.metrics.flown_flights import FlownMetric, read_runs_singly
-from components.metrics.losses import closest, losses_s
+from components.metrics.detection import ANY, DECLARED, DeclarationParameters, first_declarations
+from components.metrics.flown_flights import FlownMetric, evaluate_runs_singly
+from components.metrics.losses import find_closest_approach, loss_times_s
 from components.metrics.rows import (
     END,
     SCANS,
@@ -23,16 +23,20 @@ from components.metrics.rows import (
     PlatformParameters,
     TargetParameters,
     censoring_text,
-    earliest,
+    earliest_target,
     is_in_scan,
     is_named,
-    sensors_of,
-    values_of_target,
+    pick_target_by_replica,
+    sensors_to_measure,
 )
 from components.metrics.separation import RelativeFlight, traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.replicas.times_out import blocks_with_outages, is_out_between, outage_times_of_replicas
+from dsa_des.replicas.outage_times import (
+    blocks_with_outages,
+    outage_times_of_replicas,
+    was_out_between,
+)
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, blocks_recording
 
@@ -53,8 +57,8 @@ STEP: Any = Field(
 )  # fmt: skip
 
 
-def size(default_m: float, description: str) -> Any:
-    """Return the field of a distance that counts as a loss, m."""
+def size_field(default_m: float, description: str) -> Any:
+    """Return the pydantic field of a distance in m, with a default and a description."""
     return Field(default=default_m, gt=0, le=1e6, description=description)
 
 
@@ -69,10 +73,10 @@ class EncounterParameters(DeclarationParameters, PlatformParameters):
 class SizeParameters(PlatformParameters):
     """What counts as a loss of well clear, and as a near mid-air collision."""
 
-    horizontal_m: float = size(
+    horizontal_m: float = size_field(
         _WELL_CLEAR.horizontal_m, "Horizontal distance below which well clear is lost, m."
     )
-    vertical_m: float = size(
+    vertical_m: float = size_field(
         _WELL_CLEAR.vertical_m, "Difference in height below which well clear is lost, m."
     )
     tau_s: float = Field(
@@ -80,30 +84,32 @@ class SizeParameters(PlatformParameters):
         description="Modified tau below which well clear is lost too, s (DO-365: 35). 0: distances "
         "alone.",
     )  # fmt: skip
-    nmac_horizontal_m: float = size(
+    nmac_horizontal_m: float = size_field(
         _NMAC.horizontal_m, "Horizontal distance of a near mid-air collision, m."
     )
-    nmac_vertical_m: float = size(
+    nmac_vertical_m: float = size_field(
         _NMAC.vertical_m, "Difference in height of a near mid-air collision, m."
     )
 
     @property
     def sizes_m(self) -> tuple[tuple[float, float], ...]:
-        """Radius and half height of both cylinders, m."""
+        """Radius and half height (m) of the well-clear cylinder, then of the NMAC cylinder."""
         return (
             (self.horizontal_m, self.vertical_m),
             (self.nmac_horizontal_m, self.nmac_vertical_m),
         )
 
     def cylinders_m(self, kind: str = "") -> dict[str, tuple[float, float]]:
-        """Return radius and half height of the events that are cylinders, by name and `kind`."""
+        """Return (radius, half height) in m by event name plus `kind`: NMAC, and loss of well clear
+        unless modified tau defines it.
+        """
         lost, nmac = self.sizes_m
         clear = {} if self.tau_s else {f"well_clear_lost{kind}": lost}
         return {**clear, f"nmac{kind}": nmac}
 
-    def losses_s(self, runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-        """Return when well clear is first lost, when a collision first threatens, and 0, s."""
-        return losses_s(self.sizes_m, runs, self.tau_s)
+    def loss_times_s(self, runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+        """Return times (3, runs), s: first loss of well clear, first NMAC, and 0; NaN if never."""
+        return loss_times_s(self.sizes_m, runs, self.tau_s)
 
 
 class WellClearParameters(EncounterParameters, SizeParameters):
@@ -118,7 +124,7 @@ class _Encounter(FlownMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
-        self.sensors = self.select_on_platform(sensors_of(scene, parameters.sensors))
+        self.sensors = self.select_on_platform(sensors_to_measure(scene, parameters.sensors))
         #: Sensors, and any of them, where there is one.
         self.reports = [*self.sensors, ANY] if self.sensors else []
 
@@ -150,11 +156,18 @@ class ClosestApproach(_Encounter):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all of it for every replica."""
-        names, each = self.read_each_flight(group, read_runs_singly(_closest), to_the_end=True)
-        nearest = earliest(each[0], each[0])
-        distance, time_s = values_of_target(each[0], nearest), values_of_target(each[1], nearest)
-        code = np.where(nearest < 0, 0.0, values_of_target(each[2], nearest))
+        """Return each replica's closest approach (m), its time (s), and how long before it the
+        target was detected and declared.
+        """
+        names, each = self.evaluate_each_flight(
+            group, evaluate_runs_singly(_closest_approach), to_the_end=True
+        )
+        nearest = earliest_target(each[0], each[0])
+        distance, time_s = (
+            pick_target_by_replica(each[0], nearest),
+            pick_target_by_replica(each[1], nearest),
+        )
+        code = np.where(nearest < 0, 0.0, pick_target_by_replica(each[2], nearest))
         at = np.array([*_ENDS, _EARLY_END])[code.astype(int)]
         at[(at == END) & group.ended_early] = _EARLY_END
         values: dict[str, AnyArray] = {
@@ -162,7 +175,7 @@ class ClosestApproach(_Encounter):
             "closest_approach_time_s": time_s,
             _CUT_OFF: censoring_text(at, distance),
         }
-        for name, known in declarations(group, self.p, self.sensors, names).items():
+        for name, known in first_declarations(group, self.p, self.sensors, names).items():
             first = known.select_target(nearest)
             parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
             for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
@@ -184,12 +197,14 @@ class WellClear(_Encounter):
     Parameters = WellClearParameters
 
     def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
-        """Return the sizes of both events, of well clear where no time counts."""
+        """Return (radius, half height) in m by event: NMAC, and loss of well clear unless modified
+        tau defines it.
+        """
         cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m()
         return cylinders
 
     def results(self) -> list[Result]:
-        """Return both events, when well clear is lost, and the warning per sensor."""
+        """Return definitions: both events, time well clear is lost, and warning per sensor."""
         tau = f", or modified tau of {self.p.tau_s:g} s" if self.p.tau_s else ""
         results = [
             Result("well_clear_lost", EVENT, _cylinder_text(self.p.sizes_m[0], _WELL_CLEAR) + tau),
@@ -212,19 +227,19 @@ class WellClear(_Encounter):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all of it for every replica."""
-        names, each = self.read_each_flight(group, self.p.losses_s, to_the_end=True)
+        """Return by replica event flags, first loss of well clear, warning times by sensor (s)."""
+        names, each = self.evaluate_each_flight(group, self.p.loss_times_s, to_the_end=True)
         lost_s, collision_s, begun_s = each
         lost_at_start = is_in_scan(lost_s, begun_s)
         values: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).any(axis=1).astype(float),
             "nmac": (~np.isnan(collision_s)).any(axis=1).astype(float),
-            "well_clear_loss_time_s": _least_over_time(lost_s),
+            "well_clear_loss_time_s": _least_over_targets(lost_s),
             _LOSS_CUT_OFF: censoring_text(np.where(lost_at_start.any(axis=1), START, "")),
         }
-        for name, first in declarations(group, self.p, self.sensors, names).items():
+        for name, first in first_declarations(group, self.p, self.sensors, names).items():
             warning_s = lost_s - first.time_s
-            worst = _least_over_time(warning_s, ~np.isnan(lost_s))
+            worst = _least_over_targets(warning_s, ~np.isnan(lost_s))
             at_start = (first.at_start | lost_at_start) & (warning_s == worst[:, np.newaxis])
             values[f"warning_time_s.{name}"] = worst
             values[f"warning_cut_off.{name}"] = censoring_text(
@@ -233,8 +248,8 @@ class WellClear(_Encounter):
         return values
 
 
-def _blocks_before(scene: Scene, block: str) -> list[str]:
-    """Return which blocks may be out of those that a block hears, itself among them.
+def _upstream_blocks_that_may_fail(scene: Scene, block: str) -> list[str]:
+    """Return the blocks that may fail among a block and all it receives from, even indirectly.
 
     What steers the traffic is not: no alert is made of it.
     """
@@ -243,8 +258,8 @@ def _blocks_before(scene: Scene, block: str) -> list[str]:
     return sorted({block, *nx.ancestors(graph, block)}.intersection(blocks_with_outages(scene)))
 
 
-def _least_over_time(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
-    """Return the least value of each replica's targets (replicas, targets); NaN without any.
+def _least_over_targets(values: FloatArray, counts: BoolArray | None = None) -> FloatArray:
+    """Return each replica's smallest value over its targets, (replicas,); NaN if there is none.
 
     Of those that count it is NaN if one of them has none.
     """
@@ -254,7 +269,7 @@ def _least_over_time(values: FloatArray, counts: BoolArray | None = None) -> Flo
 
 
 def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
-    """Return the words for a cylinder in a result's description."""
+    """Return a cylinder's description by radius and half height, in feet if the standard's."""
     horizontal_m, vertical_m = sizes_m
     name = " (ASTM F3442)" if standard is _WELL_CLEAR else ""
     if (horizontal_m, vertical_m) == (standard.horizontal_m, standard.vertical_m):
@@ -263,9 +278,9 @@ def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
     return f"within {horizontal_m:g} m and {vertical_m:g} m"
 
 
-def _closest(flights: list[RelativeFlight]) -> tuple[float, ...]:
-    """Return a flight's smallest range (m), its time (s), and its number in `_ENDS`."""
-    range_m, time_s, end = closest(flights[0]) if flights else _NOWHERE
+def _closest_approach(flights: list[RelativeFlight]) -> tuple[float, ...]:
+    """Return the first flight's least range (m), its time (s), index of censoring in `_ENDS`."""
+    range_m, time_s, end = find_closest_approach(flights[0]) if flights else _NOWHERE
     if not np.isfinite(range_m):
         return float("nan"), float("nan"), 0.0
     return range_m, time_s, float(_ENDS.index(end))
@@ -315,7 +330,9 @@ class AlertTimes(FlownMetric):
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = self.select_on_platform(blocks_recording(scene, "alerts"))
         #: Which blocks may be out behind each of them that has any.
-        self._behind = {name: of for name in self._blocks if (of := _blocks_before(scene, name))}
+        self._behind = {
+            name: of for name in self._blocks if (of := _upstream_blocks_that_may_fail(scene, name))
+        }
 
     def results(self) -> list[Result]:
         """Return times and events of each alerting block."""
@@ -345,9 +362,9 @@ class AlertTimes(FlownMetric):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all of it for every replica."""
-        names, (lost_s, nmac_s, _) = self.read_each_flight(
-            group, self.p.losses_s, to_the_end=self._as_flown
+        """Return replicas' alert times (s), ranges (m); missed, late, nuisance, surprise flags."""
+        names, (lost_s, nmac_s, _) = self.evaluate_each_flight(
+            group, self.p.loss_times_s, to_the_end=self._as_flown
         )
         columns = group.tables["alerts"]
         lost, met = ~np.isnan(lost_s), ~np.isnan(nmac_s)
@@ -355,7 +372,7 @@ class AlertTimes(FlownMetric):
         for name in self._blocks:
             mine = is_named(columns["block"], name)
             first_s, below_s = (
-                _first_s(columns, mine & (columns["level"] >= level), len(group), names)
+                _first_times_s(columns, mine & (columns["level"] >= level), len(group), names)
                 for level in (self.p.level, self.p.level - 1)
             )
             alerted = ~np.isnan(first_s)
@@ -363,12 +380,12 @@ class AlertTimes(FlownMetric):
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
             range_m = self.ranges_m(group, first_s, to_the_end=self._as_flown)
-            values[f"first_alert_time_s.{name}"] = _least_over_time(first_s)
-            values[f"first_alert_range_m.{name}"] = values_of_target(
-                range_m, earliest(first_s, range_m)
+            values[f"first_alert_time_s.{name}"] = _least_over_targets(first_s)
+            values[f"first_alert_range_m.{name}"] = pick_target_by_replica(
+                range_m, earliest_target(first_s, range_m)
             )
-            values[f"alert_to_loss_s.{name}"] = _least_over_time(lead_s, lost)
-            values[f"alert_to_nmac_s.{name}"] = _least_over_time(nmac_s - first_s, met)
+            values[f"alert_to_loss_s.{name}"] = _least_over_targets(lead_s, lost)
+            values[f"alert_to_nmac_s.{name}"] = _least_over_targets(nmac_s - first_s, met)
             sudden = alerted & (first_s - below_s < self.p.surprise_s) & (self.p.level > 1)
             for what, event in {
                 "missed": missed,
@@ -382,16 +399,16 @@ class AlertTimes(FlownMetric):
                     outage_times_of_replicas,
                     lambda: outage_times_of_replicas(group.scene, group.replicas, group.duration_s),
                 )
-                due = is_out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
+                due = was_out_between(out, self._behind[name], lost_s - self.p.late_s, lost_s)
                 event = (missed & due).any(axis=1)
                 values[f"alert_missed_while_out.{name}"] = event.astype(float)
         return values
 
 
-def _first_s(
+def _first_times_s(
     columns: Mapping[str, Any], rows: BoolArray, replicas: int, targets: Sequence[str]
 ) -> FloatArray:
-    """Return the time of the first of some rows of each target, NaN without one.
+    """Return the earliest time of chosen rows, (replicas, targets), s; NaN without one.
 
     Of each replica and target, (replicas, targets).
     """

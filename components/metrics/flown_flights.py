@@ -14,12 +14,12 @@ from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     ANY_TWO,
     RelativeFlight,
-    separations,
+    relative_flights,
+    traffic_and_duration,
     traffic_block,
-    traffic_of,
 )
 from components.metrics.true_states import Coverage
-from dsa_des.arrays.keyed_table import occurrences_by_turn
+from dsa_des.arrays.keyed_table import indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.platforms import platform_by_block
@@ -36,8 +36,8 @@ _SCORES: dict[str, FloatArray] = {
 
 
 class ManoeuvresTold(NamedTuple):
-    """Manoeuvres (n,), in order of coming: when each was told and came, s, who is steered (-1 for
-    the ownship), and what it is, (n, fields of `Manoeuvre`).
+    """Manoeuvres in order of arrival: when each was sent and when it arrived (s), the steered
+    aircraft (-1: the ownship), and its fields.
     """
 
     told_s: FloatArray
@@ -46,13 +46,13 @@ class ManoeuvresTold(NamedTuple):
     manoeuvre: FloatArray
 
     def take(self, which: slice | IntArray | BoolArray) -> "ManoeuvresTold":
-        """Return some of them."""
+        """Return a selection of the manoeuvres."""
         return ManoeuvresTold(
             self.told_s[which], self.came_s[which], self.steered[which], self.manoeuvre[which]
         )
 
     def of(self, platform: int) -> "ManoeuvresTold":
-        """Return those that steer one aircraft."""
+        """Return the manoeuvres that steer one aircraft, by its index (-1: the ownship)."""
         return self.take(self.steered == platform)
 
 
@@ -62,13 +62,13 @@ _NOTHING = ManoeuvresTold(
 
 
 def flown_as_steered(own: Sequence[Any], told: Sequence[ManoeuvresTold]) -> list[SteeredFlight]:
-    """Return what aircraft fly, each steered by at least one manoeuvre."""
+    """Return the flights of aircraft steered by manoeuvres, at least one each."""
     flights = SteeredFleet(fleet_of(own))
     if not told:
         return []
     number = np.repeat(np.arange(len(told)), [len(one.came_s) for one in told])
     time_s, given = (np.concatenate(parts) for parts in list(zip(*told, strict=True))[1::2])
-    for one in occurrences_by_turn(number):  # the first of each aircraft, then the next
+    for one in indices_by_occurrence(number):  # the first of each aircraft, then the next
         flights = flights.add_manoeuvres(number[one], time_s[one], given[one])
     return list(flights)
 
@@ -92,7 +92,7 @@ class FlownMetric(TargetMetric):
         self._on: dict[str, int] = {}
         named = getattr(parameters, "platform", None)
         if named or any(block.options.platform for block in scene.blocks.values()):
-            names = traffic_of(scene)[0].platforms()
+            names = traffic_and_duration(scene)[0].platforms()
             any_two = named == "*" and self.of_any_two
             if named is not None and named not in names and not any_two:
                 raise ValueError(f"platform: there is no {named!r}{did_you_mean(named, names)}")
@@ -116,11 +116,9 @@ class FlownMetric(TargetMetric):
         if self.delays_s:
             self.tables = {**self.tables, "manoeuvres": ("block", "time_s", *_COLUMNS)}
 
-    def flights_seen(self, group: Group, number: int) -> list[Any]:
-        """Return the flight of the viewing platform in a replica, as steered, then of all it may
-        see.
-        """
-        source = traffic_of(group.scenes[number])[0]
+    def viewer_and_seen_flights(self, group: Group, number: int) -> list[Any]:
+        """Return a replica's viewing platform's flight, as steered, then all it may see."""
+        source = traffic_and_duration(group.scenes[number])[0]
         own, *others = source.seen_from(source.platforms()[self.viewer + 1])
         told = self._received_manoeuvres(group).get(number, _NOTHING)
         places = [place for place in range(len(source.targets)) if place not in source.unseen]
@@ -136,20 +134,20 @@ class FlownMetric(TargetMetric):
         return flights
 
     def select_on_platform(self, blocks: Sequence[str]) -> list[str]:
-        """Return those of some blocks that are on the platform that looks."""
+        """Return those of the given blocks that are on the viewing platform."""
         return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
-    def manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
-        """Return the manoeuvres of who looks, of every replica of a group that has any."""
+    def viewer_manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
+        """Return the viewing platform's manoeuvres by replica index, for replicas with any."""
         own = {k: told.of(self.viewer) for k, told in self._received_manoeuvres(group).items()}
         return {k: told for k, told in own.items() if len(told.came_s)}
 
     def steered_runs(self, group: Group) -> IntArray:
-        """Return the replicas in which any aircraft is steered."""
+        """Return the indices of the replicas in which any aircraft is steered."""
         return np.array(sorted(self._received_manoeuvres(group)), dtype=np.int64)
 
     def _received_manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
-        """Return the manoeuvres of every replica that has any; see `ManoeuvresTold`.
+        """Return the manoeuvres that arrived, by replica index, for replicas with any.
 
         What is told is known when all before it is.
         """
@@ -174,7 +172,7 @@ class FlownMetric(TargetMetric):
             result[number] = told._replace(told_s=np.maximum.accumulate(told.told_s))
         return result
 
-    def read_flights(
+    def evaluate_flights(
         self,
         group: Group,
         read: "Read",
@@ -183,22 +181,22 @@ class FlownMetric(TargetMetric):
         to_the_end: bool = False,
         some: IntArray | None = None,
     ) -> FloatArray:
-        """Return what `read` makes of the flights of `some` replicas, or all, (values, those)."""
+        """Return ``read`` of the flights of `some` replicas, by default all, (values, replicas)."""
         runs, run_of = self._flights(group, steered, to_the_end, some)
         return read(runs)[:, run_of]
 
     def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
-        """Return of each event that is a cylinder about the ownship its radius and half height."""
+        """Return (radius, half height), m, of each event that is an ownship cylinder, by name."""
         return {}
 
     def scored_events(self) -> Sequence[str]:
-        """Return those events, where the ownship is steered."""
+        """Return the names of events that are cylinders; none if no block steers the ownship."""
         return list(self.cylinders_m()) if self.delays_s else []
 
     def reached_s(
         self, group: Group, event: str, score: str, levels: Sequence[float]
     ) -> FloatArray:
-        """Return when runs first reach levels of a score of an event's cylinder.
+        """Return when replicas first reach a score's levels, (levels, replicas), s, or NaN.
 
         ``separation`` is the least distance of a target so far, in sizes of the cylinder.
         ``time_to_go`` is the least time so far that was left until the event if nothing more were
@@ -208,7 +206,7 @@ class FlownMetric(TargetMetric):
         radius_m, half_m = self.cylinders_m()[event]
         if score == "separation":
             limits_m = [(level * radius_m, level * half_m) for level in levels]
-            return self.read_flights(group, partial(first_within_s, limits_m), to_the_end=True)
+            return self.evaluate_flights(group, partial(first_within_s, limits_m), to_the_end=True)
         told = self._received_manoeuvres(group)
         result = np.full((len(levels), len(group)), np.inf)
         counts = np.zeros(len(group), dtype=np.int64)
@@ -217,7 +215,7 @@ class FlownMetric(TargetMetric):
             # As if no more than so many manoeuvres were told: known from when the last of them is.
             some = np.flatnonzero(counts >= count)
             steering = {k: mine.take(slice(count)) for k, mine in told.items()}
-            runs, run_of = flights_of(group, self.p.step_s, None, steering, viewer=self.viewer)
+            runs, run_of = distinct_runs(group, self.p.step_s, None, steering, viewer=self.viewer)
             used, mine = np.unique(run_of[some], return_inverse=True)
             event_s = first_within_s([(radius_m, half_m)], [runs[k] for k in used])[0, mine]
             known = [(0.0, *told.get(k, _NOTHING).told_s.tolist(), math.inf) for k in some.tolist()]
@@ -229,16 +227,16 @@ class FlownMetric(TargetMetric):
                 result[number, some] = np.minimum(result[number, some], better)
         return np.where(np.isinf(result), np.nan, result)
 
-    def read_each_flight(
+    def evaluate_each_flight(
         self, group: Group, read: "Read", *, to_the_end: bool = False
     ) -> tuple[list[str], FloatArray]:
-        """Return names of targets, and what `read` makes of each by itself.
+        """Return target names, and ``read`` of each flight singly, (values, replicas, targets).
 
         Values are (values, replicas, targets), NaN where a replica has no such target.
         """
         runs, run_of = self._flights(group, True, to_the_end)
         alone = [[flight] for run in runs for flight in run]
-        names = _names(runs)
+        names = _sorted_target_names(runs)
         index = {name: number for number, name in enumerate(names)}
         values = read(alone or [[]])
         result = np.full((len(values), len(runs), len(names)), np.nan)
@@ -247,12 +245,13 @@ class FlownMetric(TargetMetric):
         return names, result[:, run_of]
 
     def ranges_m(self, group: Group, time_s: FloatArray, *, to_the_end: bool) -> FloatArray:
-        """Return the slant range of each target, at a time (replicas, targets) of its own, m.
+        """Return slant ranges to targets at a time for each, (replicas, targets), m.
 
-        Targets are those of `read_each_flight`; NaN where there is no time, or one is not there.
+        Targets are those of `evaluate_each_flight`; NaN where there is no time, or one is not
+        there.
         """
         runs, run_of = self._flights(group, True, to_the_end)
-        names = _names(runs)
+        names = _sorted_target_names(runs)
         known = [(k, flight) for k, run in enumerate(runs) for flight in run]
         number_of = {(k, flight.name): n for n, (k, flight) in enumerate(known)}
         result = np.full(time_s.shape, np.nan)
@@ -261,7 +260,7 @@ class FlownMetric(TargetMetric):
         flight = np.array([number_of[k, names[t]] for k, t in of], dtype=np.int64)
         if len(flight):
             together = FlightsTogether([flight for _, flight in known])
-            range_m = together.apart_m(flight, time_s[replica, target])[0]
+            range_m = together.distances_at_m(flight, time_s[replica, target])[0]
             result[replica, target] = np.where(np.isfinite(range_m), range_m, np.nan)
         return result
 
@@ -270,7 +269,7 @@ class FlownMetric(TargetMetric):
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
         steering = self._received_manoeuvres(group) if steered else {}
         target, step_s = getattr(self.p, "target", None), self.p.step_s
-        return flights_of(
+        return distinct_runs(
             group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self.viewer
         )
 
@@ -279,12 +278,12 @@ class FlownMetric(TargetMetric):
 Read = Callable[[Sequence[list[RelativeFlight]]], FloatArray]
 
 
-def read_runs_singly(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
-    """Return what reads the flights of one run after the other."""
+def evaluate_runs_singly(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
+    """Return a function that stacks `read` of each run's flights, (values, runs)."""
     return lambda runs: np.array([read(flights) for flights in runs]).T
 
 
-def flights_of(
+def distinct_runs(
     group: Group,
     step_s: float | None,
     target: str | None,
@@ -294,7 +293,7 @@ def flights_of(
     some: IntArray | None = None,
     viewer: int = -1,
 ) -> tuple[list[list[RelativeFlight]], IntArray]:
-    """Return the flights of runs that differ, and which of these each of `some` replicas is.
+    """Return all distinct runs' flights, and the run index for each of `some` replicas.
 
     All are by default. Flights are computed once for all replicas that share them. Distances are
     taken every `step_s`; None looks between them for losses. A target of None is all of them. The
@@ -323,7 +322,7 @@ def flights_of(
         if run_of[number] < len(runs):
             continue
         scene = group.scenes[number] if mine else group.scene
-        make = partial(separations, scene, step_s, until_s, viewer)
+        make = partial(relative_flights, scene, step_s, until_s, viewer)
         flights = group.cached(("separations", step_s, viewer, key), make)
         runs.append([flight for flight in flights if target in (None, flight.name)])
         if alone and runs[-1]:
@@ -331,7 +330,7 @@ def flights_of(
     told = [
         (number, place, flight, there)
         for number in steered
-        for place, flight in _aircraft_of(runs[run_of[number]]).items()
+        for place, flight in _flights_by_index(runs[run_of[number]]).items()
         if len((there := _limit_to_presence(place, flight, steering[number].of(place))).came_s)
     ]
     flown = flown_as_steered([one[2] for one in told], [one[3] for one in told])
@@ -345,13 +344,13 @@ def flights_of(
     return runs, run_of if some is None else run_of[some]
 
 
-def _names(runs: Sequence[list[RelativeFlight]]) -> list[str]:
-    """Return the names of all targets, in their order."""
+def _sorted_target_names(runs: Sequence[list[RelativeFlight]]) -> list[str]:
+    """Return the sorted names of all targets in the runs."""
     return sorted({flight.name for run in runs for flight in run})
 
 
-def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
-    """Return the flights of a run's aircraft, by their index."""
+def _flights_by_index(run: Sequence[RelativeFlight]) -> dict[int, Any]:
+    """Return the flights of all aircraft of a run, by aircraft index (-1: the ownship)."""
     return {
         place: flight
         for one in run
@@ -360,7 +359,7 @@ def _aircraft_of(run: Sequence[RelativeFlight]) -> dict[int, Any]:
 
 
 def _limit_to_presence(place: int, flight: Any, told: ManoeuvresTold) -> ManoeuvresTold:
-    """Return what an aircraft is told while it is there; the ownship always is."""
+    """Return the manoeuvres that arrive while an aircraft is present; all for the ownship."""
     if place < 0:
         return told
     first_s, last_s = flight.interval_present()
@@ -382,16 +381,16 @@ class PlatformTracks(Metric):
             self.tables = {**self._flown.tables, **self.tables}
 
     def blocks_on_board(self, blocks: Sequence[str]) -> list[str]:
-        """Return those of some blocks that are on the platform."""
+        """Return those of the given blocks that are on the platform."""
         return [*blocks] if self._flown is None else self._flown.select_on_platform(blocks)
 
     def flights(self, group: Group, number: int) -> list[Any]:
-        """Return the flights of the platform in a replica, and of all that it may see."""
+        """Return the platform's flight in one replica, then those of all aircraft it may see."""
         if self._flown is None:
-            flights: list[Any] = traffic_of(group.scenes[number])[0].seen_from()
+            flights: list[Any] = traffic_and_duration(group.scenes[number])[0].seen_from()
             return flights
-        return self._flown.flights_seen(group, number)
+        return self._flown.viewer_and_seen_flights(group, number)
 
     def coverage(self, scene: Scene, flights: Sequence[Any]) -> Coverage:
-        """Return what of these flights the platform's sensors cover."""
+        """Return the coverage by the platform's sensors of the given flights."""
         return Coverage(scene, flights, self.blocks_on_board([*scene.blocks]))

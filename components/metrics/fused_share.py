@@ -22,7 +22,7 @@ from components.metrics.rows import (
     is_named,
     is_of_target,
     select_rows,
-    sensors_of,
+    sensors_to_measure,
     share_columns,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -53,7 +53,7 @@ class FusedShare(TargetMetric):
         super().__init__(parameters, scene)
         self.fusion = blocks_recording(scene, FUSED)[0]
         fed = {wire.source for wire in scene.wires if wire.target == self.fusion}
-        names = [name for name in sensors_of(scene, parameters.sensors) if name in fed]
+        names = [name for name in sensors_to_measure(scene, parameters.sensors) if name in fed]
         if len(names) < 2:
             raise ValueError(f"needs two sensors that feed {self.fusion}; there is {names}")
         self.pairs = list(itertools.permutations(names, 2))
@@ -66,7 +66,7 @@ class FusedShare(TargetMetric):
     def results(self) -> list[Result]:
         """Return one share per ordered pair of sensors."""
         return [
-            Result(_name(a, b), SHARE, f"detections of {a} that were fused with one of {b}")
+            Result(_share_name(a, b), SHARE, f"detections of {a} that were fused with one of {b}")
             for a, b in self.pairs
         ]
 
@@ -80,16 +80,16 @@ class FusedShare(TargetMetric):
         for a, b in self.pairs:
             seen = is_named(detections["block"], a) & is_of_target(detections, self.p.target)
             own = select_rows(detections, seen, "target", "time_s")
-            both = _holds(fused["sensors"], a) & _holds(fused["sensors"], b)
+            both = _names_sensor(fused["sensors"], a) & _names_sensor(fused["sensors"], b)
             pair = select_rows(fused, both, "target", "time_s")
-            used = _latest(own, pair, self.delay_s[a])
+            used = _detections_used(own, pair, self.delay_s[a])
             trials = np.bincount(own["replica"], minlength=len(group))
             successes = np.bincount(own["replica"][used], minlength=len(group))
-            values |= share_columns(_name(a, b), successes, trials)
+            values |= share_columns(_share_name(a, b), successes, trials)
         return values
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
-        """Return the share of two periodic clocks, if every scan detects.
+        """Return ordered sensor pairs' expected fused share by name, if every scan detects.
 
         Exact clocks are counted in rational numbers, in the long run; of clocks that jitter or
         drift it is the expected share of this run, and there is none where a block may end the run
@@ -111,7 +111,7 @@ class FusedShare(TargetMetric):
         for a, b in self.pairs:
             share = _expected_share(scene, gate, (clocks[a], arrives[a]), (clocks[b], arrives[b]))
             if share is not None:
-                values[_name(a, b)] = share
+                values[_share_name(a, b)] = share
         return values
 
 
@@ -121,7 +121,9 @@ def _expected_share(
     one: tuple[ClockSpec, Fraction],
     other: tuple[ClockSpec, Fraction],
 ) -> float | None:
-    """Return the share of one clock's scans that meet the other's; each with its delay (s)."""
+    """Return the expected share of one clock's scans that coincide with the other's; None if the
+    run's length is not known.
+    """
     (own, delay_s), (theirs, other_delay_s) = one, other
     if any(clock.jitter_s or clock.rate_error_ppm for clock in (own, theirs)):
         # How long a run is that a block may end is not known before it.
@@ -150,19 +152,19 @@ def _expected_share(
     return float(share)
 
 
-def _name(a: str, b: str) -> str:
+def _share_name(a: str, b: str) -> str:
     return f"fused_share.{a}_with_{b}"
 
 
-def _holds(column: Any, name: str) -> BoolArray:
-    """Return which rows of a column such as ``radar+eo`` name a sensor."""
+def _names_sensor(column: Any, name: str) -> BoolArray:
+    """Return which rows of a column such as ``radar+eo`` contain a sensor's name (mask)."""
     assert isinstance(column, Text)
     holds = np.array([name in known.split("+") for known in column.names] + [False], dtype=bool)
     return holds[column.codes]
 
 
-def _latest(own: dict[str, Any], fused: dict[str, Any], delay_s: float) -> IntArray:
-    """Return the distinct detections that fused rows rest on: the latest arrived of the target."""
+def _detections_used(own: dict[str, Any], fused: dict[str, Any], delay_s: float) -> IntArray:
+    """Return the indices of detections that fused rows use: the latest arrived of each target."""
     names = {name: k for k, name in enumerate(own["target"].names)}
     lookup = np.array([names.get(name, -1) for name in fused["target"].names] + [-1])
     target = lookup[fused["target"].codes]
@@ -187,7 +189,7 @@ def coincidence_share(
     before_s: Fraction = Fraction(0),
     after_s: Fraction = Fraction(0),
 ) -> Fraction:
-    """Return the share of a clock's scans t that meet one of the other clock, in the long run.
+    """Return the long-run share of a clock's scans at t with a scan of the other near t.
 
     That is one at t - before_s ≤ t' ≤ t + after_s, both bounds inclusive and 0 or more.
     """
@@ -198,13 +200,13 @@ def coincidence_share(
     if before_s + after_s >= period:
         return Fraction(1)
     # Phases are phase + j·spacing for j = 0 ... phases - 1; an earlier partner is that far away.
-    early = _count(before_s, phase, spacing, phases)
-    late = _count(after_s, (-phase) % spacing, spacing, phases)
+    early = _count_within(before_s, phase, spacing, phases)
+    late = _count_within(after_s, (-phase) % spacing, spacing, phases)
     both = 1 if phase == 0 else 0  # the same instant is early and late
     return Fraction(min(phases, early + late - both), phases)
 
 
-def _count(reach: Fraction, first: Fraction, spacing: Fraction, most: int) -> int:
+def _count_within(reach: Fraction, first: Fraction, spacing: Fraction, most: int) -> int:
     """Return how many of first, first + spacing, ... lie within reach, at most `most`."""
     if reach < first:
         return 0
@@ -231,8 +233,8 @@ def mean_coincidence_share(
         if 2 * gate_ticks + _SIGMAS * clock.jitter_s * ticks_per_s >= clock.period_s * ticks_per_s:
             return None
     sigma = math.hypot(own.jitter_s, other.jitter_s) * ticks_per_s
-    mine = _grid(own, ticks_per_s, end_tick) + delay_ticks
-    theirs = _grid(other, ticks_per_s, end_tick) + other_delay_ticks
+    mine = _scan_ticks(own, ticks_per_s, end_tick) + delay_ticks
+    theirs = _scan_ticks(other, ticks_per_s, end_tick) + other_delay_ticks
     theirs = theirs[theirs < end_tick]
     if not len(mine) or not len(theirs):
         return None
@@ -247,7 +249,7 @@ def mean_coincidence_share(
     return float(np.mean(np.minimum(share, 1.0)))
 
 
-def _grid(spec: ClockSpec, ticks_per_s: int, end_tick: int) -> IntArray:
+def _scan_ticks(spec: ClockSpec, ticks_per_s: int, end_tick: int) -> IntArray:
     return ScanClock(spec, ticks_per_s).between(0, end_tick)[1]
 
 

@@ -15,8 +15,8 @@ from components.flights.closest_approach import (
     KnownTimes,
     RegularTimes,
     SampleTimes,
+    censoring_end,
     closest_approaches,
-    end_of_look,
 )
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.many_flights import fleet_of
@@ -24,16 +24,16 @@ from components.geometry import TrajectoryState, line_of_sight_ned
 from components.metrics.separation import (
     RelativeFlight,
     distances_m,
-    mean_states,
     position_of,
+    states_with_mean_velocity,
 )
 from components.well_clear.separation import first_inside_cylinder
 from components.well_clear.volume import Volume, is_inside_cylinder, violation_span
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
-def closest(flight: RelativeFlight) -> tuple[float, float, str]:
-    """Return the smallest range (m), its time (s), the first of several, and how it is censored.
+def find_closest_approach(flight: RelativeFlight) -> tuple[float, float, str]:
+    """Return a flight's smallest range (m), its earliest time (s), and a word for its censoring.
 
     See `components.flights.closest_approach.end_of_look`.
     """
@@ -47,11 +47,11 @@ def closest(flight: RelativeFlight) -> tuple[float, float, str]:
         if len(there_s):
             looked_s = np.array([np.fmin(looked_s[0], there_s[0]), there_s[-1]])
     present_s = np.array(flight.present_s())[:, 0]
-    return *best, end_of_look(best[1], looked_s, present_s, flight.end_s)
+    return *best, censoring_end(best[1], looked_s, present_s, flight.end_s)
 
 
 def first_times_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
-    """Return when a target first is within each (horizontal, vertical) distance, s; NaN if never.
+    """Return when the target is first within each (horizontal, vertical) distance, s; else NaN.
 
     Asked at the flight's times only, and exclusive; `first_losses_s` looks between them.
     """
@@ -69,7 +69,7 @@ def first_times_inside(flight: Any, *limits_m: tuple[float, float]) -> list[floa
 
 
 def first_violation_s(flight: RelativeFlight, volume: Volume) -> float:
-    """Return when a flight first violates a volume, s; NaN if never.
+    """Return the first time at which a flight violates a well-clear volume, s; NaN if never.
 
     Between one time of the flight's grid, or sample of its source, and the next, both aircraft are
     taken to fly straight; the volume's closed form then tells when it is entered, at any time at
@@ -85,7 +85,9 @@ def first_violation_s(flight: RelativeFlight, volume: Volume) -> float:
         if len(time_s) < 2:
             continue
         begin, end = time_s[:-1], time_s[1:]
-        span = violation_span(volume, mean_states(flight, begin, begin, end), 0.0, end - begin)
+        span = violation_span(
+            volume, states_with_mean_velocity(flight, begin, begin, end), 0.0, end - begin
+        )
         met = np.isfinite(span.begin_s)
         if met.any():
             first = int(np.argmax(met))
@@ -94,7 +96,7 @@ def first_violation_s(flight: RelativeFlight, volume: Volume) -> float:
 
 
 class FlightsTogether:
-    """The ownships and targets of many relative flights."""
+    """The own and target aircraft of many relative flights, evaluated together."""
 
     def __init__(self, flights: Sequence[RelativeFlight]) -> None:
         self.flights = flights
@@ -109,24 +111,30 @@ class FlightsTogether:
         return self._owns.each(self._own_of[flight], time_s)
 
     def target_at(self, flight: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return the states of the targets, likewise."""
+        """Return the states of the targets of flights (n,), each at its own time (n,)."""
         return self._targets.each(flight, time_s)
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
-        """Return the first and the last time (flights,) at which both aircraft may be there, s."""
+        """Return when both aircraft can be present, first and last time, (flights,) each, s."""
         limits = np.array([flight.present_s() for flight in self.flights]).reshape(-1, 2)
         return limits[:, 0], limits[:, 1]
 
-    def closing_mps(self) -> FloatArray:
-        """No distance of the two of a flight changes faster, m/s, (flights,)."""
-        return np.array([flight.closing_mps for flight in self.flights])
+    def closing_speed_bound_mps(self) -> FloatArray:
+        """Return an upper bound on how fast any distance in a flight changes, (flights,), m/s."""
+        return np.array([flight.closing_speed_bound_mps for flight in self.flights])
 
-    def level_distances_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
-        """Return horizontal distance and difference of altitudes; infinite where one is absent."""
-        return self.apart_m(flight, time_s)[1:]
+    def horizontal_and_vertical_m(
+        self, flight: IntArray, time_s: FloatArray
+    ) -> tuple[FloatArray, ...]:
+        """Return horizontal distance and altitude difference of flights (n,), each at its own time,
+        m; infinite if one is absent.
+        """
+        return self.distances_at_m(flight, time_s)[1:]
 
-    def apart_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
-        """Return `separation.distances_m` of flights (n,), each at a time (n,) of its own."""
+    def distances_at_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
+        """Return slant range, horizontal distance and altitude difference of flights (n,), each at
+        its own time (n,), m.
+        """
         blocks = []
         for first in range(0, len(flight), CELLS_AT_ONCE):
             some = flight[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE]
@@ -135,7 +143,8 @@ class FlightsTogether:
 
 
 def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, float]) -> FloatArray:
-    """Return when targets first are within each (horizontal, vertical), s, (flights, limits).
+    """Return the first time (s) at which each target is within each (horizontal, vertical)
+    distance, (flights, limits).
 
     NaN where a target never is. Flights that look between samples are asked by
     `components.well_clear.separation`, with its error bound; others at their times only.
@@ -150,7 +159,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
     together = FlightsTogether([flights[number] for number in between])
     first_s, last_s = together.present_s()
     end_s = np.array([flight.end_s for flight in together.flights])
-    closing_mps = together.closing_mps()
+    closing_mps = together.closing_speed_bound_mps()
     for k, limits in enumerate(limits_m):
         # Who never comes into a cylinder comes into none within it.
         maybe = np.ones(len(rows), dtype=np.bool_)
@@ -158,7 +167,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
             if wider[0] >= limits[0] and wider[1] >= limits[1]:
                 maybe &= ~np.isnan(result[rows, before])
         some = np.flatnonzero(maybe)
-        apart = partial(_states_of_some, together.level_distances_m, some)
+        apart = partial(_states_of_some, together.horizontal_and_vertical_m, some)
         result[rows[some], k] = first_inside_cylinder(
             apart, (np.maximum(first_s, 0.0)[some], np.minimum(last_s, end_s)[some]),
             closing_mps[some], *limits,
@@ -166,21 +175,21 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
     return result
 
 
-def nearest_of(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
-    """Return the smallest range (m) of each flight and its time (s), as `closest` does.
+def nearest_ranges_and_times(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
+    """Return each flight's smallest range (m) and its time (s), each (flights,).
 
     Infinite and NaN where both are never there.
     """
     result = np.full((2, len(flights)), np.inf)
     short = [number for number, flight in enumerate(flights) if flight.is_short]
     for number in sorted(set(range(len(flights))) - set(short)):
-        result[:, number] = closest(flights[number])[:2]
+        result[:, number] = find_closest_approach(flights[number])[:2]
     if short:
-        result[:, short] = _nearest([flights[number] for number in short])
+        result[:, short] = _nearest_of_short_flights([flights[number] for number in short])
     return result[0], result[1]
 
 
-def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
+def _nearest_of_short_flights(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
     together = FlightsTogether(flights)
     first_s, last_s = together.present_s()
     best = Approaches.unknown(len(flights))
@@ -198,7 +207,7 @@ def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]
             partial(_states_of_some, together.own_at, some),
             partial(_states_of_some, together.target_at, some),
             times,
-            closing_speed_mps=together.closing_mps()[some],
+            closing_speed_mps=together.closing_speed_bound_mps()[some],
             present_s=(first_s[some], np.minimum(last_s, ends_s)[some]),
             best=mine,
         )
@@ -206,12 +215,12 @@ def _nearest(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]
     return best.range_m, best.time_s
 
 
-def losses_s(
+def loss_times_s(
     sizes_m: tuple[tuple[float, float], ...],
     runs: Sequence[list[RelativeFlight]],
     tau_s: float = 0.0,
 ) -> FloatArray:
-    """Return when well clear is first lost, when a collision first threatens, and the start, s.
+    """Return times (3, runs), s: first loss of well clear, first NMAC, start (0); NaN if never.
 
     Of runs with several flights the first counts; NaN for what never happens, (3, runs). Sizes are
     (horizontal, vertical) of well clear and of a collision; a modified tau of 0 is a cylinder.
@@ -232,7 +241,8 @@ def losses_s(
 def first_within_s(
     limits_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
 ) -> FloatArray:
-    """Return when the first target of each run is within each (horizontal, vertical), s.
+    """Return the first time (s) at which any target of a run is within each (horizontal, vertical)
+    distance, (limits, runs).
 
     (limits, runs); NaN for never. Limits fall.
     """
@@ -249,10 +259,11 @@ def _states_of_some(at: Any, some: IntArray, flight: IntArray, time_s: FloatArra
     return at(some[flight], time_s)
 
 
-def ways_of(
+def displacements_around(
     flights: Sequence[RelativeFlight], time_s: FloatArray, base_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return how far ownships and targets move around a time (flights,) of each, m.
+    """Return the displacements of ownships and targets over an interval around each time, north and
+    east, (2, flights), m.
 
     From `base_s` before it to as long after it, as far as both are there; (north, east) in the
     ownship's level plane then, each (2, flights).
@@ -278,18 +289,19 @@ _COARSE_S = 1.0
 _BASE_S = 0.5
 
 
-def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return course and bearing (2, runs) of the nearest intruder at the closest approach, degrees.
+def course_and_bearing_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    """Return relative course and bearing of each run's nearest intruder at its closest approach,
+    (2, runs), degrees.
 
     Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
     from the ownship's course: opposite to its velocity relative to the ownship. NaN where they
     never meet.
     """
     flights = [flight for run in runs for flight in run]
-    nearest = _nearest_of_each(runs, *nearest_of(flights))
+    nearest = _nearest_of_each(runs, *nearest_ranges_and_times(flights))
     angles = np.full((2, len(runs)), np.nan)
-    angles[:, nearest.runs] = _angles_deg(
-        *ways_of([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
+    angles[:, nearest.runs] = _course_and_bearing_deg(
+        *displacements_around([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
     )
     return angles
 
@@ -297,13 +309,14 @@ def meeting_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
 def nominal_geometry(
     sizes_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
 ) -> FloatArray:
-    """Return about how the nearest intruder of each run is met, (7 + 2 cylinders, runs).
+    """Return approximately how each run meets its nearest intruder, (7 + 2 cylinders, runs).
 
     Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
     the closest approach, NaN for how long before it was foreseen, then course and bearing
-    (`meeting_deg`), degrees; NaN where none is met. Then how near any comes to the side while no
-    further up or down than each cylinder reaches, and up or down while no further to the side, m;
-    infinite where it never is. Distances are looked at every `_COARSE_S`: enough to choose by.
+    (`course_and_bearing_deg`), degrees; NaN where none is met. Then how near any comes to the side
+    while no further up or down than each cylinder reaches, and up or down while no further to the
+    side, m; infinite where it never is. Distances are looked at every `_COARSE_S`: enough to
+    choose by.
     """
     flights = [flight for run in runs for flight in run]
     result = np.full((7 + 2 * len(sizes_m), len(runs)), np.nan)
@@ -315,7 +328,7 @@ def nominal_geometry(
     times_s, every = _COARSE_S * np.arange(many), np.arange(len(flights))
     level_m, up_m = (
         part.reshape(len(flights), many)
-        for part in together.level_distances_m(
+        for part in together.horizontal_and_vertical_m(
             np.repeat(every, many), np.tile(times_s, len(flights))
         )
     )
@@ -323,13 +336,13 @@ def nominal_geometry(
     index = np.argmin(range_m, axis=1)
     nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
     some, time_s = nearest.flights, nearest.time_s
-    own_m, other_m = ways_of([flights[k] for k in some], time_s, _BASE_S)
+    own_m, other_m = displacements_around([flights[k] for k in some], time_s, _BASE_S)
     speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
     result[0, nearest.runs] = time_s
     result[1, nearest.runs] = level_m[some, index[some]]
     result[2, nearest.runs] = up_m[some, index[some]]
     result[3, nearest.runs] = speed_mps
-    result[5:7, nearest.runs] = _angles_deg(own_m, other_m)
+    result[5:7, nearest.runs] = _course_and_bearing_deg(own_m, other_m)
     of = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
     for k, (radius_m, half_m) in enumerate(sizes_m):
         for row, near, miss_m in ((0, up_m < half_m, level_m), (1, level_m < radius_m, up_m)):
@@ -339,11 +352,11 @@ def nominal_geometry(
 
 
 def nearest_in_runs(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return the smallest range (m) of any flight of each run, and its time (s), (2, runs).
+    """Return each run's smallest range over all its flights (m) and its time (s), (2, runs).
 
     NaN where no two are ever there together.
     """
-    range_m, time_s = nearest_of([flight for run in runs for flight in run])
+    range_m, time_s = nearest_ranges_and_times([flight for run in runs for flight in run])
     nearest = _nearest_of_each(runs, range_m, time_s)
     result = np.full((2, len(runs)), np.nan)
     result[:, nearest.runs] = range_m[nearest.flights], nearest.time_s
@@ -351,7 +364,7 @@ def nearest_in_runs(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
 
 
 class _Nearest(NamedTuple):
-    """Runs in which another aircraft is met, with the nearest one of each and its time."""
+    """Indices of runs that meet another aircraft, each one's nearest flight (index) and time."""
 
     runs: list[int]
     flights: IntArray
@@ -374,8 +387,8 @@ def _nearest_of_each(
     return _Nearest(met, chosen, time_s[chosen])
 
 
-def _angles_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
-    """Return course and bearing (2, flights) of intruders, by how both move, degrees."""
+def _course_and_bearing_deg(own_m: FloatArray, other_m: FloatArray) -> FloatArray:
+    """Return intruders' relative course and bearing from both displacements, (2, flights), deg."""
     angles = np.empty((2, own_m.shape[1]))
     for number, (own, other) in enumerate(zip(own_m.T.tolist(), other_m.T.tolist(), strict=True)):
         course = [math.degrees(math.atan2(e, n)) for n, e in (own, other)]

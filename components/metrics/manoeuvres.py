@@ -23,15 +23,15 @@ class ManoeuvreTimes(FlownMetric):
             raise ValueError("needs a block that steers the ownship: no manoeuvres are wired")
 
     def results(self) -> list[Result]:
-        """Return a time and a number."""
+        """Return two results' definitions: time of the first manoeuvre and number of manoeuvres."""
         return [
             Result("first_manoeuvre_time_s", NUMBER, "first manoeuvre of the ownship, s"),
             Result("manoeuvres", NUMBER, "manoeuvres that reach the ownship"),
         ]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return both for every replica; no time where there is no manoeuvre."""
+        """Return each replica's first manoeuvre arrival (s; else NaN) and their number."""
         first, count = np.full(len(group), np.nan), np.zeros(len(group))
-        for replica, told in self.manoeuvres(group).items():
+        for replica, told in self.viewer_manoeuvres(group).items():
             first[replica], count[replica] = told.came_s[0], len(told.came_s)
         return {"first_manoeuvre_time_s": first, "manoeuvres": count}

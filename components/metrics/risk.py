@@ -14,8 +14,8 @@ import numpy.typing as npt
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.encounter import STEP, SizeParameters, size
-from components.metrics.flown_flights import FlownMetric, read_runs_singly
+from components.metrics.encounter import STEP, SizeParameters, size_field
+from components.metrics.flown_flights import FlownMetric, evaluate_runs_singly
 from components.metrics.losses import nearest_in_runs
 from components.metrics.rows import TargetParameters
 from components.metrics.separation import RelativeFlight, relative_states, traffic_block
@@ -46,7 +46,7 @@ class RiskParameters(SizeParameters):
 
 
 class MitigatedParameters(RiskParameters):
-    """What counts as an event, and between whom."""
+    """Sizes of the events that are counted, and the platform whose pairs count."""
 
     platform: str | None = Field(
         default=None,
@@ -68,7 +68,7 @@ class Mitigated(FlownMetric):
             raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {name!r}")
 
     def results(self) -> list[Result]:
-        """Return both events, nominal and mitigated."""
+        """Return four results' definitions: loss of well clear, NMAC, nominal and mitigated."""
         sizes = self.p.sizes_m
         return [
             Result(f"{name}_{which}", EVENT, f"{how} within {radius:g} m and {half:g} m")
@@ -77,30 +77,34 @@ class Mitigated(FlownMetric):
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the flags of every replica; without a manoeuvre both flights are the same."""
-        nominal = self.nominal(group)
+        """Return each replica's flags of both events, nominal (no manoeuvres) and mitigated."""
+        nominal = self.nominal_event_flags(group)
         mitigated = {name: nominal[f"{name}_nominal"].copy() for name in _EVENTS}
         told = self.steered_runs(group)
         if len(told):
-            for name, flags in self.losses(group, steered=True, some=told).items():
+            for name, flags in self.event_flags(group, steered=True, some=told).items():
                 mitigated[name][told] = flags
         return {**nominal, **{f"{name}_mitigated": of for name, of in mitigated.items()}}
 
     def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
-        """Return the sizes of the events as steered."""
+        """Return (radius, half height) in m of the mitigated events, by event name."""
         cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m("_mitigated")
         return cylinders
 
-    def nominal(self, group: Group) -> dict[str, AnyArray]:
-        """Return both events of every replica's flights without manoeuvres."""
-        return {f"{name}_nominal": of for name, of in self.losses(group, steered=False).items()}
+    def nominal_event_flags(self, group: Group) -> dict[str, AnyArray]:
+        """Return each replica's flags (1.0 or 0.0) of both events without manoeuvres."""
+        return {
+            f"{name}_nominal": of for name, of in self.event_flags(group, steered=False).items()
+        }
 
-    def losses(
+    def event_flags(
         self, group: Group, *, steered: bool, some: IntArray | None = None
     ) -> dict[str, AnyArray]:
-        """Return both events of the flights of some replicas, or all, nominal or as steered."""
-        lost_s, collision_s, _ = self.read_flights(
-            group, self.p.losses_s, steered=steered, some=some
+        """Return the flags (1.0 or 0.0) of loss of well clear and NMAC in some replicas, flown as
+        steered or without manoeuvres.
+        """
+        lost_s, collision_s, _ = self.evaluate_flights(
+            group, self.p.loss_times_s, steered=steered, some=some
         )
         return {
             name: (~np.isnan(time_s)).astype(float)
@@ -108,12 +112,12 @@ class Mitigated(FlownMetric):
         }
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return what happens without manoeuvres."""
-        return self.nominal(group)
+        """Return each replica's flags of both events as they would be without manoeuvres."""
+        return self.nominal_event_flags(group)
 
 
 class LeastSeparationParameters(RiskParameters):
-    """Whose pairs count, what is a loss, and how it is found."""
+    """Which pairs of aircraft count, the sizes that define a loss, and how it is computed."""
 
     platform: str = Field(
         default="*", description="Name of the aircraft whose pairs count; by default any two."
@@ -136,7 +140,7 @@ class LeastSeparation(FlownMetric):
         super().__init__(parameters, scene, steered=parameters.steered)
 
     def results(self) -> list[Result]:
-        """Return the distance, its time, and both events."""
+        """Return the results' definitions: least distance of any pair, its time, both events."""
         results = [
             Result("least_separation_m", NUMBER, "smallest slant range of any two, m", least=0.0),
             Result("least_separation_time_s", NUMBER, "when that is, s", least=0.0),
@@ -147,14 +151,14 @@ class LeastSeparation(FlownMetric):
         ]
 
     def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
-        """Return the sizes of both events, of well clear where no time counts."""
+        """Return each event's (radius, half height), m: NMAC, and LoWC unless by modified tau."""
         cylinders: dict[str, tuple[float, float]] = self.p.cylinders_m()
         return {f"any_{name}": sizes for name, sizes in cylinders.items()}
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return all of it for every replica."""
-        range_m, time_s = self.read_flights(group, nearest_in_runs, to_the_end=True)
-        losses = self.read_flights(group, self.p.losses_s, to_the_end=True)[:2]
+        """Return each replica's least range of any pair (m), its time (s), both events' flags."""
+        range_m, time_s = self.evaluate_flights(group, nearest_in_runs, to_the_end=True)
+        losses = self.evaluate_flights(group, self.p.loss_times_s, to_the_end=True)[:2]
         return {
             "least_separation_m": range_m,
             "least_separation_time_s": time_s,
@@ -168,8 +172,8 @@ class LeastSeparation(FlownMetric):
 class SeverityParameters(TargetParameters, SizeParameters):
     """Sizes of the boundary, and whose altimeters are which."""
 
-    horizontal_m: float = size(4000 * FOOT_M, "Horizontal size of well clear, m.")
-    vertical_m: float = size(450 * FOOT_M, "Vertical size of well clear, m.")
+    horizontal_m: float = size_field(4000 * FOOT_M, "Horizontal size of well clear, m.")
+    vertical_m: float = size_field(450 * FOOT_M, "Vertical size of well clear, m.")
     tau_s: float = Field(default=35.0, ge=0, le=600, description="Its modified tau, s.")
     mode_c_own: bool = Field(
         default=False,
@@ -192,7 +196,7 @@ class Severity(FlownMetric):
     Parameters = SeverityParameters
 
     def results(self) -> list[Result]:
-        """Return both."""
+        """Return the results' definitions: largest severity (percent), NMAC probability."""
         return [
             Result(
                 "slowc_percent",
@@ -205,20 +209,27 @@ class Severity(FlownMetric):
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return both for every replica; NaN where no target is ever there with the ownship."""
-        values = self.read_flights(group, read_runs_singly(self._severities), to_the_end=True)
+        """Return each replica's largest severity (percent) and probability of an NMAC; NaN if no
+        target is ever present with the ownship.
+        """
+        values = self.evaluate_flights(
+            group, evaluate_runs_singly(self._severity_and_collision), to_the_end=True
+        )
         return {"slowc_percent": values[0], "pnmac": values[1]}
 
-    def _severities(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
-        each = [(self._severity(flight), self._collision(flight)) for flight in flights]
+    def _severity_and_collision(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
+        each = [
+            (self._largest_severity(flight), self._collision_probability(flight))
+            for flight in flights
+        ]
         values = np.array(each, dtype=np.float64).reshape(-1, 2)
         if not len(values) or np.isnan(values).all():
             return float("nan"), float("nan")
         largest: FloatArray = np.fmax.reduce(values)
         return float(largest[0]), float(largest[1])
 
-    def _severity(self, flight: RelativeFlight) -> float:
-        """Return the largest severity of a flight over its times, and about the largest."""
+    def _largest_severity(self, flight: RelativeFlight) -> float:
+        """Return a flight's largest severity, refined at its peak, percent; NaN without times."""
         sizes = self.p.horizontal_m, self.p.vertical_m, self.p.tau_s
 
         def at(time_s: FloatArray) -> FloatArray:
@@ -236,8 +247,8 @@ class Severity(FlownMetric):
             return best
         return max(best, float(at(self._refine_times(flight, best_s)).max()))
 
-    def _collision(self, flight: RelativeFlight) -> float:
-        """Return the probability at the horizontal closest approach."""
+    def _collision_probability(self, flight: RelativeFlight) -> float:
+        """Return the probability of an NMAC at the horizontal closest approach of a flight."""
         best, best_s = float("inf"), float("nan")
         for piece in flight.pieces():
             index = int(np.argmin(piece.horizontal_m))
@@ -261,7 +272,7 @@ class Severity(FlownMetric):
         return float(result[0])
 
     def _refine_times(self, flight: RelativeFlight, time_s: float) -> FloatArray:
-        """Return finer times about one, within the time at which both are there."""
+        """Return a finer grid around one time, limited to when both aircraft are present, s."""
         first_s, last_s = (float(times[0]) for times in flight.present_s())
         step_s = self.p.step_s / _FINER
         about = time_s + step_s * np.arange(-_FINER, _FINER + 1)
@@ -276,7 +287,7 @@ def risk_ratios_by_class(
     cluster: npt.ArrayLike | None = None,
     **options: object,
 ) -> dict[str, RiskRatio]:
-    """Return the ratio of every class of encounters, in order of the classes' names.
+    """Return the risk ratio of each class of encounters, sorted by class name.
 
     Parameters
     ----------

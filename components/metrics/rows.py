@@ -21,12 +21,12 @@ NEVER = "never"
 
 
 def is_in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
-    """Return which events lie in the first (or last) scan, which may have cut them off."""
+    """Return which events are at the run's first (or last) scan, which may cut them off (mask)."""
     return np.equal(time, scan)
 
 
 def censoring_text(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
-    """Return what a study's column says of values: ``at the start``, ``never`` or nothing.
+    """Return censoring texts: ``at`` and the place if cut off, ``never`` for NaN, else None.
 
     `at` is where each is cut off, empty where it is not; values are NaN where it did not happen, if
     that is worth saying.
@@ -68,10 +68,10 @@ class SensorMetricParameters(TargetParameters):
 
 
 class TargetMetric(Metric):
-    """A metric of one target, where its parameters name one, or of any."""
+    """A metric of one named target, or of any target if none is named."""
 
     def check(self, blocks: Mapping[str, Component]) -> None:
-        """Refuse a target that the traffic does not have."""
+        """Raise ValueError if the parameters name a target that the traffic does not have."""
         sources = [block for block in blocks.values() if isinstance(block, TrafficSource)]
         names = [target.name for source in sources for target in source.targets]
         if getattr(self.p, "platform", None):
@@ -81,13 +81,15 @@ class TargetMetric(Metric):
             raise ValueError(f"target: there is no {target!r}{did_you_mean(target, names)}")
 
 
-def numbers(meanings: Mapping[str, str]) -> list[Result]:
-    """Return results that are numbers of 0 or more, by name with what they mean."""
+def number_results(meanings: Mapping[str, str]) -> list[Result]:
+    """Return the definitions of results that are numbers >= 0, from names and descriptions."""
     return [Result(name, NUMBER, meaning, least=0.0) for name, meaning in meanings.items()]
 
 
-def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()) -> list[str]:
-    """Return the sensors to measure: those chosen, or all, and `extra` names."""
+def sensors_to_measure(
+    scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] = ()
+) -> list[str]:
+    """Return the names of the sensors to measure: the chosen ones, else all and the `extra`."""
     known = [*blocks_recording(scene, "detections"), *extra]
     for name in chosen or ():
         if name not in known:
@@ -96,7 +98,7 @@ def sensors_of(scene: Scene, chosen: Sequence[str] | None, extra: Sequence[str] 
 
 
 def is_named(column: Any, name: str) -> BoolArray:
-    """Return which rows of a text column hold a name."""
+    """Return a mask of the rows (True) of a text column that hold the given name."""
     assert isinstance(column, Text)
     if name not in column.names:
         return np.zeros(len(column), dtype=bool)
@@ -104,7 +106,7 @@ def is_named(column: Any, name: str) -> BoolArray:
 
 
 def is_of_target(columns: Columns, target: str | None) -> BoolArray:
-    """Return which rows are of the target (of any target: false alarms belong to none)."""
+    """Return which rows are of a target, with None of any (mask); False for false alarms."""
     if target is not None:
         return is_named(columns["target"], target)
     column = columns["target"]
@@ -113,7 +115,7 @@ def is_of_target(columns: Columns, target: str | None) -> BoolArray:
 
 
 def select_rows(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any]:
-    """Return the chosen rows of ``replica`` and the named columns."""
+    """Return ``replica`` and the named columns at the rows where the mask is True."""
     kept = np.flatnonzero(rows)
     result: dict[str, Any] = {}
     for name in ("replica", *names):
@@ -123,8 +125,8 @@ def select_rows(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any
     return result
 
 
-def first_of_targets(columns: Columns, rows: IntArray, count: int) -> IntArray:
-    """Return the row of each replica's first report of each target, (count, names), -1 for none.
+def first_rows_of_targets(columns: Columns, rows: IntArray, count: int) -> IntArray:
+    """Return the row of each target's first report by replica, (replicas, names); else -1.
 
     Names are those of the column; rows to look at and columns are in recorded order.
     """
@@ -137,8 +139,8 @@ def first_of_targets(columns: Columns, rows: IntArray, count: int) -> IntArray:
     return result.reshape(count, many)
 
 
-def earliest(time_s: FloatArray, range_m: FloatArray) -> IntArray:
-    """Return which target comes first in each replica, of several at one instant the nearest.
+def earliest_target(time_s: FloatArray, range_m: FloatArray) -> IntArray:
+    """Return each replica's earliest target (index), the nearest of several; -1 if all NaN.
 
     Times and ranges (replicas, targets) are NaN for what does not happen; -1 where nothing does.
     """
@@ -153,18 +155,20 @@ def earliest(time_s: FloatArray, range_m: FloatArray) -> IntArray:
     return np.where(none.all(axis=1), -1, nearest.argmin(axis=1))
 
 
-def values_of_target(values: AnyArray, target: IntArray) -> AnyArray:
-    """Return the value (replicas, targets) of one target of each replica; of one of -1 none."""
+def pick_target_by_replica(values: AnyArray, target: IntArray) -> AnyArray:
+    """Return each replica's value of its own given target, (replicas,); NaN or 0 for target -1."""
     return _append_missing(values)[np.arange(len(values)), target]
 
 
-def values_of_targets(values: AnyArray, target: IntArray) -> AnyArray:
-    """Return values (replicas, targets) of some targets; of one that is -1 there are none."""
+def pick_targets(values: AnyArray, target: IntArray) -> AnyArray:
+    """Return the columns of the given targets for all replicas, (replicas, given targets); NaN or 0
+    where a target is -1.
+    """
     return _append_missing(values)[:, target]
 
 
 def _append_missing(values: AnyArray) -> AnyArray:
-    """Return values (replicas, targets) with those of no target last: NaN, or 0 and False."""
+    """Return the values with one more column, for a target -1: NaN, or 0 or False."""
     none = np.full((len(values), 1), np.nan if values.dtype.kind == "f" else 0, values.dtype)
     return np.concatenate([values, none], axis=1)
 
@@ -178,14 +182,14 @@ def column_at_rows(columns: Columns, name: str, rows: IntArray) -> FloatArray:
 
 
 def share_columns(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
-    """Return a share and its trials; NaN where there was no trial."""
+    """Return a share (NaN without trials) and its number of trials under two column names."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(trials > 0, successes / trials, np.nan)
     return {name: share, name + TRIALS: trials.astype(float)}
 
 
 def name_ranks(column: Any) -> IntArray:
-    """Return the alphabetical rank of each row's name, so that order rests on names alone."""
+    """Return each row's alphabetical rank of its name, else -1, so codes do not set the order."""
     assert isinstance(column, Text)
     rank = np.empty(len(column.names) + 1, dtype=np.int64)
     rank[sorted(range(len(column.names)), key=column.names.__getitem__)] = np.arange(
@@ -196,16 +200,18 @@ def name_ranks(column: Any) -> IntArray:
 
 
 def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
-    """Return when a sensor's scan `number` (from 1) is in every replica, s; NaN without so many."""
-    time_s, start, end = group.cached(("scans_of", name), lambda: _scans_of(group, name))
+    """Return the time of scan `number` (from 1) in each replica, s; NaN if it has fewer scans."""
+    time_s, start, end = group.cached(
+        ("scans_of", name), lambda: _scan_times_and_bounds(group, name)
+    )
     at = start + number - 1
     result = np.full(len(group), np.nan)
     result[at < end] = time_s[at[at < end]]
     return result
 
 
-def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
-    """Return the times of a sensor's scans, and where those of each replica start and end."""
+def _scan_times_and_bounds(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
+    """Return a sensor's scan times, and the start and end index of each replica's in them."""
     columns: Any = group.tables["scans"]
     rows = np.flatnonzero(is_named(columns["block"], name))
     replica, numbers = columns["replica"][rows], np.arange(len(group))
@@ -214,13 +220,13 @@ def _scans_of(group: Group, name: str) -> tuple[FloatArray, IntArray, IntArray]:
 
 
 def is_at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
-    """Return whether what takes so many scans of a sensor was seen as early as a start lets it.
+    """Return which times are that of scan `scans`, the earliest that the run's start allows.
 
     Times are those of replicas, or of replicas and their targets.
     """
     return is_in_scan(time_s.T, scan_time_s(group, name, scans)).T
 
 
-def start_or_never(cut: BoolArray, values: FloatArray) -> AnyArray:
-    """Return the column that says where values are left-censored, by the start of the run."""
+def left_censoring_text(cut: BoolArray, values: FloatArray) -> AnyArray:
+    """Return censoring texts: ``at the start`` where `cut`, ``never`` for NaN, else None."""
     return censoring_text(np.where(cut, START, ""), values)

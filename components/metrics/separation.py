@@ -42,7 +42,7 @@ _BASE_S = 0.05
 
 @dataclass(frozen=True, eq=False)
 class Separation:
-    """Distances of one target from the ownship at some times; infinite where either is absent.
+    """Distances between ownship and a target at some times; infinite where either is absent.
 
     The horizontal one lies in the ownship's level plane, the vertical one is the difference of the
     altitudes above the ellipsoid, not negative.
@@ -56,7 +56,7 @@ class Separation:
 
 
 def traffic_block(scene: Scene) -> Block:
-    """Return the block that moves the aircraft; ValueError where not one knows its flights."""
+    """Return the scene's only traffic block with known flights; ValueError if none or several."""
     result = [b for b in scene.blocks.values() if issubclass(b.cls, TrafficSource)]
     if len(result) != 1:
         raise ValueError(
@@ -65,8 +65,8 @@ def traffic_block(scene: Scene) -> Block:
     return result[0]
 
 
-def traffic_of(scene: Scene) -> tuple[Any, float]:
-    """Return the traffic source of a scene as it is before a run, and how long that lasts, s."""
+def traffic_and_duration(scene: Scene) -> tuple[Any, float]:
+    """Return a scene's traffic source, built without a run, and the duration of the run, s."""
     block = traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     source: Any = block.cls(block.name, block.parameters, context)
@@ -75,10 +75,10 @@ def traffic_of(scene: Scene) -> tuple[Any, float]:
     return source, float(duration)
 
 
-def separations(
+def relative_flights(
     scene: Scene, step_s: float | None, until_s: float = math.inf, viewer: int = -1
 ) -> "list[RelativeFlight]":
-    """Return the distances of every target of a scene, up to an early end of the run at `until_s`.
+    """Return the relative flight of every target of a scene, up to the time `until_s`.
 
     Seen from a target, by its index, it and the ownship (-1) change places; with `ANY_TWO` those of
     any two aircraft.
@@ -86,7 +86,7 @@ def separations(
     They are taken on a grid of `step_s` and at the times of the source's own samples. None looks
     between them for losses, with a grid of `STEP_S` for all else.
     """
-    source, duration_s = traffic_of(scene)
+    source, duration_s = traffic_and_duration(scene)
     end_s = min(duration_s, until_s)
     count = regular_count(step_s or STEP_S, end_s)
     seen = [number for number in range(len(source.targets)) if number not in source.unseen]
@@ -98,7 +98,7 @@ def separations(
 
 
 class RelativeFlight:
-    """The distances of one target from the ownship, in pieces of time one after the other.
+    """The distances between one target and the ownship over a run, computed piece by piece.
 
     A grid of `count` times, `step_s` apart; a spacing of None also looks between them.
     """
@@ -126,7 +126,7 @@ class RelativeFlight:
         self._known: list[Separation] | None = None
 
     def replace_flights(self, flights: Mapping[int, Any]) -> "RelativeFlight":
-        """Return the same with other flights of the ownship (-1) and of targets, by their index."""
+        """Return this relative flight with the given aircraft's flights (-1: ownship) replaced."""
         result = copy(self)
         result.own, result.target = (
             flights.get(place, nominal)
@@ -156,12 +156,12 @@ class RelativeFlight:
         return np.unique(np.concatenate(result))
 
     def present_s(self) -> tuple[FloatArray, FloatArray]:
-        """Return the first and the last time (1,) at which both aircraft may be there, s."""
+        """Return the first and last time at which both aircraft can be present, (1,) each, s."""
         return present_together_s(self.own, np.array([self.target.interval_present()]), self.end_s)
 
     @property
-    def closing_mps(self) -> float:
-        """No distance of the two changes faster, m/s."""
+    def closing_speed_bound_mps(self) -> float:
+        """Upper bound on how fast any distance of the two aircraft changes, m/s."""
         fastest = float(self.own.max_speed_mps + self.target.max_speed_mps)
         return fastest * _SPEED_MARGIN + _TURN_MARGIN_MPS
 
@@ -174,7 +174,7 @@ class RelativeFlight:
         return self.own.at(time_s), self.target.at(time_s)
 
     def pieces(self) -> Iterator[Separation]:
-        """Yield the distances in pieces of about `MOST_AT_ONCE`; those of a short run are kept."""
+        """Yield distances over pieces of about `MOST_AT_ONCE` times; short runs computed once."""
         if not self.is_short:
             yield from self._pieces()
             return
@@ -198,7 +198,7 @@ class RelativeFlight:
 
     @property
     def _targets_with_samples(self) -> list[int]:
-        """Return the targets whose sample times are those of the pair."""
+        """Return the indices of the pair's targets, whose own sample times also count."""
         return [place for place in self.places if place >= 0]
 
     def _samples(self) -> list[SampleTimes]:
@@ -209,7 +209,7 @@ class RelativeFlight:
 def _sample_times_between(
     times: SampleTimes, target: int, first_s: float, last_s: float
 ) -> FloatArray:
-    """Return the times of a target in [first_s, last_s]."""
+    """Return the sample times of one target in [first_s, last_s], s."""
     one = np.array([target])
     first, last = times.numbers_between(one, np.array([first_s]), np.array([last_s]))
     number = np.arange(first[0], last[0] + 1)
@@ -240,7 +240,7 @@ def position_of(state: Any) -> list[FloatArray]:
 
 
 def relative_states(flight: RelativeFlight, time_s: FloatArray) -> tuple[FloatArray, ...]:
-    """Return where the ownship is relative to a target, and how fast, at some times.
+    """Return the ownship's position relative to a target: east, north, up (m), rates (m/s).
 
     East and north in the ownship's level plane and difference of altitudes, m, and their rates,
     m/s: ownship less target.
@@ -248,13 +248,13 @@ def relative_states(flight: RelativeFlight, time_s: FloatArray) -> tuple[FloatAr
     first_s, last_s = (float(times[0]) for times in flight.present_s())
     before = np.maximum(time_s - _BASE_S, max(first_s, 0.0))
     after = np.minimum(time_s + _BASE_S, last_s)
-    return mean_states(flight, time_s, before, after)
+    return states_with_mean_velocity(flight, time_s, before, after)
 
 
-def mean_states(
+def states_with_mean_velocity(
     flight: RelativeFlight, time_s: FloatArray, before: FloatArray, after: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """Return `relative_states` at some times, with the mean velocities from before to after."""
+    """Return `relative_states` with velocities averaged from `before` to `after`."""
     here, _ = flight.states(time_s)
     origin = position_of(here)
 

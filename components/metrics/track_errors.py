@@ -14,7 +14,7 @@ from pydantic import Field
 
 from components.arguments.units import NAUTICAL_MILE_M
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import is_held
+from components.messages.state_tracks import is_confirmed_or_coasted
 from components.metrics.flown_flights import PlatformTracks
 from components.metrics.rows import PlatformParameters
 from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
@@ -33,7 +33,7 @@ _ERRORS = {
 
 
 class ErrorsByRangeParameters(PlatformParameters):
-    """At which ranges, and which share of the errors lies within the result."""
+    """At which ranges errors are evaluated, and which quantile of them is the result."""
 
     ranges_nmi: tuple[float, ...] = Field(
         default=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0), min_length=1, max_length=40,
@@ -84,10 +84,14 @@ class ErrorsByRange(PlatformTracks):
         return results
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return the sample of every replica at every range."""
+        """Return each replica's track errors at every range, whether it is tracked there, and the
+        range of the first track.
+        """
         values = {result.name: np.full(len(group), np.nan) for result in self.results()}
         columns: Any = group.tables[_TABLE]
-        kept = is_held(columns["track_status"]) & np.asarray(columns["has_range"], dtype=bool)
+        kept = is_confirmed_or_coasted(columns["track_status"]) & np.asarray(
+            columns["has_range"], dtype=bool
+        )
         names = columns["block"].names
         aboard = [names.index(name) for name in self.blocks_on_board(names)]
         kept &= np.isin(columns["block"].codes, aboard)
@@ -120,10 +124,10 @@ class ErrorsByRange(PlatformTracks):
         range_m = np.full((len(targets), len(time_s)), np.inf)
         for number, target in enumerate(targets):
             position, there = position_in_frame(target, time_s, origin)
-            seen = coverage.holds(target, time_s) & there
+            seen = coverage.is_covered(target, time_s) & there
             range_m[number, seen] = np.sqrt((position[:, seen] ** 2).sum(axis=0))
         for r in self.p.ranges_nmi:
-            target, k = _nearest(range_m, r * NAUTICAL_MILE_M)
+            target, k = _target_and_instant_at_range(range_m, r * NAUTICAL_MILE_M)
             if k < 0:
                 continue
             inside = (told_s <= time_s[k] + 1e-9) & (told_s > time_s[k] - 2.0 * self.p.step_s)
@@ -137,7 +141,8 @@ class ErrorsByRange(PlatformTracks):
     def _errors(
         self, columns: Any, rows: IntArray, own: Any, targets: Sequence[Any]
     ) -> tuple[dict[str, FloatArray], IntArray, IntArray, float]:
-        """Return errors of rows that are a target's, the rows, whose, and the first one's range.
+        """Return the errors of rows by name, the rows that belong to a target, the target of each,
+        and the first one's range (m).
 
         A row is of the target that is nearest to it.
         """
@@ -168,8 +173,8 @@ class ErrorsByRange(PlatformTracks):
         return error, rows, of, first
 
 
-def _nearest(range_m: FloatArray, wanted_m: float) -> tuple[int, int]:
-    """Return which target (targets, instants) is first nearest to a range, and when.
+def _target_and_instant_at_range(range_m: FloatArray, wanted_m: float) -> tuple[int, int]:
+    """Return target and instant (indices) with range nearest the wanted; (-1, -1) if none near.
 
     Within half a mile of it, or -1; ranges of who is not seen are infinite.
     """

@@ -16,7 +16,7 @@ from components.metrics.rows import (
     TargetParameters,
     is_of_target,
     name_ranks,
-    numbers,
+    number_results,
     select_rows,
 )
 from dsa_des.arrays.sorted_union import sorted_union
@@ -27,7 +27,7 @@ from dsa_des.time.clock import ClockSpec
 
 
 class _Lines:
-    """Rows of one table, sorted by replica, target and time; *gaps* lie between two of a line."""
+    """Rows sorted by replica, target and time; a target's consecutive rows form a gapped line."""
 
     def __init__(self, columns: Any, rows: BoolArray, *names: str) -> None:
         self.rows = select_rows(columns, rows, "target", "time_s", *names)
@@ -44,7 +44,7 @@ class _Lines:
 
 
 def _order(replica: IntArray, target: IntArray, time_s: FloatArray) -> Any:
-    """Return what puts rows in order of replica, target and time; of one target they are so."""
+    """Return indices that sort rows by replica, target and time; a full slice if sorted."""
     same = (replica[1:] == replica[:-1]) & (target[1:] == target[:-1])
     if bool((same & (time_s[1:] >= time_s[:-1]) | (replica[1:] > replica[:-1])).all()):
         return slice(None)
@@ -62,7 +62,7 @@ def _means(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
 
 
 def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) -> FloatArray:
-    """Return each replica's quantile: the smallest value that `share` lie at or below."""
+    """Return each replica's quantile, (count,): the least value >= at least `share` of values."""
     order = np.lexsort((values, replica))
     many = np.bincount(replica, minlength=count)
     start = np.cumsum(many) - many
@@ -74,7 +74,7 @@ def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) 
 
 
 class AgeOfInformation(TargetMetric):
-    """Age of the newest measurement that the fusion holds of a target, over its time in view.
+    """Age of a target's newest measurement in the fusion, from the first to the last arrival.
 
     An age counts from when the measurement was made, so whatever kept it on its way is in it.
     Between two arrivals it grows with time; the mean and the 95th percentile are over time, from
@@ -89,14 +89,14 @@ class AgeOfInformation(TargetMetric):
         self.fusion = blocks_recording(scene, FUSED)[0]
 
     def results(self) -> list[Result]:
-        """Return mean and 95th percentile."""
-        return numbers({
+        """Return the definitions of two results: the mean and the 95th percentile of the age."""
+        return number_results({
             "age_of_information_mean_s": "mean age of what the fusion holds, s",
             "age_of_information_p95_s": "age exceeded 5 % of the time, s",
         })  # fmt: skip
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return mean and percentile of every replica."""
+        """Return each replica's mean and 95th percentile of the age over time, s."""
         columns = group.tables[FUSED]
         known = "measured_s" if "measured_s" in columns else "time_s"
         lines = _Lines(columns, is_of_target(columns, self.p.target), known)
@@ -117,7 +117,9 @@ class AgeOfInformation(TargetMetric):
         }
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
-        """Return both for a single sensor that detects in every scan that is not lost."""
+        """Return the expected mean and 95th percentile of the age (s) for a single sensor that
+        detects in every scan that is not lost.
+        """
         feed = only_feed(scene, self.fusion)
         if feed is None:
             return {}
@@ -146,7 +148,7 @@ def _running_max(values: FloatArray, lines: _Lines) -> FloatArray:
 def _ramp_quantiles(
     replica: IntArray, low: FloatArray, high: FloatArray, span: FloatArray, share: float
 ) -> FloatArray:
-    """Return the age that is not exceeded for `share` of the time, ages being ramps low → high."""
+    """Return each replica's age not exceeded for `share` of the time, if ages rise linearly."""
     result = np.full(len(span), np.nan)
     for number in np.flatnonzero(span > 0).tolist():
         start, end = np.searchsorted(replica, [number, number + 1])
@@ -166,7 +168,7 @@ def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
 
 
 def _is_updated(columns: Any, rows: BoolArray) -> BoolArray:
-    """Return which of the rows hold another measurement than the one before of their line."""
+    """Return which rows have a new measurement since that replica and target's last row (mask)."""
     if "measured_s" not in columns:  # a recording that knows ages only, from arrivals
         return rows & np.asarray(columns["age_s"] <= 0.0)
     lines = _Lines(columns, rows, "measured_s", "updated_by")
@@ -199,9 +201,9 @@ class TrackUpdates(TargetMetric):
     tables = {"tracks": ("target", "time_s", "age_s", "measured_s", "updated_by", "block")}
 
     def results(self) -> list[Result]:
-        """Return interval, continuity and breaks."""
+        """Return four definitions: update interval (mean, 95th percentile), continuity, breaks."""
         said = "share of a track's time that it is not broken"
-        interval, p95, breaks = numbers({
+        interval, p95, breaks = number_results({
             "track_update_interval_s": "mean time between updates of a track, s",
             "track_update_interval_p95_s": "95th percentile of it, s",
             "track_breaks": "number of breaks",
@@ -209,7 +211,9 @@ class TrackUpdates(TargetMetric):
         return [interval, p95, Result("track_continuity", FRACTION, said), breaks]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return all four of every replica."""
+        """Return each replica's mean and 95th percentile of the update interval (s), continuity
+        (share of time) and number of breaks.
+        """
         columns: Any = group.tables["tracks"]
         lines = _Lines(columns, _is_updated(columns, is_of_target(columns, self.p.target)))
         count = len(group)
@@ -249,13 +253,13 @@ class PositionError(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return the error of positions (where there is a range) and of directions."""
-        return numbers({
+        return number_results({
             "fused_position_error_m": "distance to the true position, rms, m",
             "fused_angle_error_deg": "angle to the true direction, rms, deg",
         })  # fmt: skip
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return both errors of every replica."""
+        """Return each replica's root mean square errors of position and of direction."""
         columns: Any = group.tables[FUSED]
         rows = select_rows(columns, is_of_target(columns, self.p.target), *self.tables[FUSED][1:])
         seen = unit_vector_unchecked(rows["azimuth_rad"], rows["elevation_rad"])
@@ -275,7 +279,7 @@ class PositionError(TargetMetric):
 
 @dataclass(frozen=True)
 class Feed:
-    """A sensor's way to a block: clock, share that no wire loses, and delay with all latency."""
+    """A sensor's connection to a block: its clock, share of scans not lost, and total delay."""
 
     clock: ClockSpec
     through: float
@@ -288,7 +292,7 @@ class Feed:
 
 
 def only_feed(scene: Scene, block: str) -> Feed | None:
-    """Return the way of the one sensor that feeds a block, directly; None if there are several.
+    """Return the `Feed` of a block's only directly connected sensor; None if there are several.
 
     None also where lateness is random or queues decide about it: no formula is known then.
     """
@@ -309,12 +313,12 @@ def only_feed(scene: Scene, block: str) -> Feed | None:
 
 
 def mean_interval_s(period_s: float, through: float) -> float:
-    """Return the mean time between scans that come through, s."""
+    """Return the mean time between arriving scans, s, if each arrives with chance `through`."""
     return period_s / through
 
 
 def mean_age_s(period_s: float, through: float, jitter_s: float = 0.0) -> float:
-    """Return the mean over time of the time since the last scan that came through, s.
+    """Return the mean age of the last scan that arrived, over time, s.
 
     Scans come through independently with probability q = `through`, so the number N of periods
     between two that do is geometric: E[N] = 1/q, E[N²] = (2 - q)/q². By the renewal-reward theorem
@@ -326,7 +330,7 @@ def mean_age_s(period_s: float, through: float, jitter_s: float = 0.0) -> float:
 
 
 def age_quantile_s(period_s: float, through: float, share: float) -> float:
-    """Return the age that is not exceeded for `share` of the time, without jitter, s.
+    """Return the last scan's age not exceeded for `share` of the time, without jitter, s.
 
     The age lies beyond n periods for the share (1 - through)^n of the time, and is uniform
     between two multiples of the period.

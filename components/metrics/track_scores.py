@@ -24,7 +24,9 @@ _SETS = (
 
 
 class SetDistance(NamedTuple):
-    """OSPA, from 0 to the cut-off, and GOSPA, whose p-th power is the sum of those of its parts."""
+    """OSPA distance, between 0 and the cut-off, and GOSPA distance with its parts for localisation,
+    missed and false tracks, m.
+    """
 
     ospa_m: float
     gospa_m: float
@@ -33,8 +35,10 @@ class SetDistance(NamedTuple):
     false_m: float
 
 
-def set_distance(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) -> SetDistance:
-    """Return OSPA and GOSPA from distances (tracks, truths); p is the order, 1 or more."""
+def ospa_and_gospa(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) -> SetDistance:
+    """Return the OSPA and GOSPA distances for distances (tracks, truths) with a cut-off, both in m;
+    `order` is their exponent p, 1 or more.
+    """
     tracks, truths = distance_m.shape
     if tracks == 0 and truths == 0:
         return SetDistance(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -68,7 +72,7 @@ def assign_least_cost(cost: FloatArray) -> tuple[IntArray, IntArray]:
 
 @dataclass(frozen=True, eq=False)
 class ReportedTracks:
-    """Confirmed tracks that have a range, as they stand at one instant; there may be none.
+    """Confirmed tracks with a range at one instant and their errors against all targets, if any.
 
     Errors (targets, 6, tracks) are position and velocity north, east, down less those of each
     target: ``error`` of tracks that went on at their velocities since they were reported,
@@ -117,10 +121,10 @@ class TrackTally:
     before_s: float = 0.0
 
     def add(self, tracks: ReportedTracks, present: IntArray) -> None:
-        """Compare the tracks of an instant with the targets that are present."""
+        """Compare tracks at one instant with the present targets (indices); add to the sums."""
         count = len(tracks.number)
         apart = np.sqrt((tracks.error[present, :3] ** 2).sum(axis=1)).T
-        result = set_distance(apart, self.within_m, self.order)
+        result = ospa_and_gospa(apart, self.within_m, self.order)
         self.sets.append(result)
         self.present += len(present)
         self.tracks += count
@@ -132,31 +136,31 @@ class TrackTally:
             if apart[track, k] >= self.within_m:
                 continue
             left.discard(int(track))
-            self._pair(tracks, int(track), int(present[k]))
+            self._record_pair(tracks, int(track), int(present[k]))
         for track in left:
             near = int(np.argmin(apart[track])) if len(present) else -1
             if near < 0 or apart[track, near] >= self.within_m:
                 self.spurious += 1
                 continue
             self.owned.add(int(tracks.number[track]))
-            self._accuracy(tracks.error[present[near], :, track])
+            self._record_accuracy(tracks.error[present[near], :, track])
         self.before_s = tracks.time_s
 
-    def _pair(self, tracks: ReportedTracks, track: int, target: int) -> None:
+    def _record_pair(self, tracks: ReportedTracks, track: int, target: int) -> None:
         self.tracked += 1
         if tracks.is_new[track]:
             error = tracks.error_as_reported[target, :, track]
             self.nees.append(float(error @ np.linalg.solve(tracks.covariance[track], error)))
             self.error.append(error)
             self.paired_s.append(tracks.time_s)
-        self._accuracy(tracks.error[target, :, track])
+        self._record_accuracy(tracks.error[target, :, track])
         number = int(tracks.number[track])
         self.numbers.setdefault(target, []).append(number)
         # Between two instants it was confirmed when that was reported, not at the next instant.
         self.since.setdefault(target, max(float(tracks.confirmed_s[track]), self.before_s))
         self.owned.add(number)
 
-    def _accuracy(self, error: FloatArray) -> None:
+    def _record_accuracy(self, error: FloatArray) -> None:
         self.accuracy.append((float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))))
 
     def results(
@@ -166,40 +170,44 @@ class TrackTally:
         covered_s: Mapping[str, float],
         duration_s: float,
     ) -> dict[str, float]:
-        """Return the scores, by when each target was first detected and entered the coverage."""
-        results = self._errors()
+        """Return the scores by result name, given when each target was first detected and first in
+        coverage (by name, s).
+        """
+        results = self._error_results()
         sets = np.array(self.sets).reshape(-1, len(_SETS))
-        results |= {name: mean_of(sets[:, i]) for i, name in enumerate(_SETS)}
+        results |= {name: mean_or_nan(sets[:, i]) for i, name in enumerate(_SETS)}
         associated = len(self.accuracy)
-        results["track_completeness"] = _ratio(self.tracked, self.present)
-        results["track_ambiguity"] = _ratio(associated, self.tracked)
-        results["track_spuriousness"] = _ratio(self.spurious, self.tracks)
+        results["track_completeness"] = _ratio_or_nan(self.tracked, self.present)
+        results["track_ambiguity"] = _ratio_or_nan(associated, self.tracked)
+        results["track_spuriousness"] = _ratio_or_nan(self.spurious, self.tracks)
         accuracy = np.array(self.accuracy).reshape(-1, 2)
-        results["track_positional_accuracy_m"] = mean_of(accuracy[:, 0])
-        results["track_velocity_accuracy_m_s"] = mean_of(accuracy[:, 1])
+        results["track_positional_accuracy_m"] = mean_or_nan(accuracy[:, 0])
+        results["track_velocity_accuracy_m_s"] = mean_or_nan(accuracy[:, 1])
         longest = sum(max(own.count(n) for n in set(own)) for own in self.numbers.values())
-        results["track_longest_share"] = _ratio(longest, sum(self.steps_present.values()))
-        broken, swapped = changes(self.numbers)
+        results["track_longest_share"] = _ratio_or_nan(longest, sum(self.steps_present.values()))
+        broken, swapped = count_breaks_and_swaps(self.numbers)
         results["track_broken"], results["track_swapped"] = broken, swapped
-        results["track_number_changes_per_s"] = _ratio(broken + swapped, self.tracked * self.step_s)
+        results["track_number_changes_per_s"] = _ratio_or_nan(
+            broken + swapped, self.tracked * self.step_s
+        )
         since = {names[t]: value for t, value in self.since.items()}
-        results["track_confirmation_s"] = _delay(since, detected_s)
-        results["track_confirmation_from_coverage_s"] = _delay(since, covered_s)
+        results["track_confirmation_s"] = _mean_delay_s(since, detected_s)
+        results["track_confirmation_from_coverage_s"] = _mean_delay_s(since, covered_s)
         there = [name for name in covered_s if names.index(name) in self.steps_present]
-        results["track_confirmed_share"] = _ratio(sum(n in since for n in there), len(there))
+        results["track_confirmed_share"] = _ratio_or_nan(sum(n in since for n in there), len(there))
         false = len(self.confirmed - self.owned)
-        results["track_false_per_hour"] = _ratio(3600.0 * false, duration_s)
+        results["track_false_per_hour"] = _ratio_or_nan(3600.0 * false, duration_s)
         return results
 
-    def last_nees(self, after_s: float, up_to_s: float) -> float:
-        """Return the mean normalised error squared at the last instant of a stretch with any."""
+    def mean_nees_at_last_instant(self, after_s: float, up_to_s: float) -> float:
+        """Return the mean NEES at the last instant with one in (after_s, up_to_s]; else NaN."""
         time_s = np.array(self.paired_s)
         inside = (time_s > after_s) & (time_s <= up_to_s)
         if not inside.any():
             return float("nan")
         return float(np.mean(np.array(self.nees)[time_s == time_s[inside].max()]))
 
-    def _errors(self) -> dict[str, float]:
+    def _error_results(self) -> dict[str, float]:
         low, high = chi_square_bounds(6)
         nees = np.array(self.nees)
         square = np.array(self.error).reshape(-1, 6) ** 2
@@ -212,27 +220,27 @@ class TrackTally:
         for i, axis in enumerate(_AXES):
             parts[f"track_{axis}_error_m"] = square[:, i]
             parts[f"track_{axis}_error_m_s"] = square[:, 3 + i]
-        result = {name: mean_of(values) ** 0.5 for name, values in parts.items()}
-        result["track_nees_mean"] = mean_of(nees)
-        result["track_nees_inside"] = mean_of((nees >= low) & (nees <= high))
+        result = {name: mean_or_nan(values) ** 0.5 for name, values in parts.items()}
+        result["track_nees_mean"] = mean_or_nan(nees)
+        result["track_nees_inside"] = mean_or_nan((nees >= low) & (nees <= high))
         return result
 
 
 def innovation_results(nis: FloatArray, freedom: IntArray) -> dict[str, float]:
-    """Return consistency from normalised innovations squared and their degrees of freedom."""
+    """Return two results by name: innovations squared per degree of freedom, share in bounds."""
     inside = np.zeros(len(nis), dtype=bool)
     for many in np.unique(freedom).tolist():
         low, high = chi_square_bounds(many)
         mine = freedom == many
         inside[mine] = (nis[mine] >= low) & (nis[mine] <= high)
     return {
-        "track_nis_per_freedom": _ratio(float(nis.sum()), float(freedom.sum())),
-        "track_nis_inside": mean_of(inside),
+        "track_nis_per_freedom": _ratio_or_nan(float(nis.sum()), float(freedom.sum())),
+        "track_nis_inside": mean_or_nan(inside),
     }
 
 
-def changes(numbers: Mapping[int, list[int]]) -> tuple[float, float]:
-    """Return how often tracks of targets go on under new numbers, and under another's."""
+def count_breaks_and_swaps(numbers: Mapping[int, list[int]]) -> tuple[float, float]:
+    """Return how often targets continue under a new number (broken) or another's (swapped)."""
     broken = swapped = 0
     for target, own in numbers.items():
         others = {n for other, theirs in numbers.items() if other != target for n in theirs}
@@ -243,14 +251,14 @@ def changes(numbers: Mapping[int, list[int]]) -> tuple[float, float]:
     return float(broken), float(swapped)
 
 
-def _delay(since: Mapping[str, float], begin_s: Mapping[str, float]) -> float:
-    return mean_of(np.array([since[name] - begin_s[name] for name in since if name in begin_s]))
+def _mean_delay_s(since: Mapping[str, float], begin_s: Mapping[str, float]) -> float:
+    return mean_or_nan(np.array([since[name] - begin_s[name] for name in since if name in begin_s]))
 
 
-def mean_of(values: Any) -> float:
+def mean_or_nan(values: Any) -> float:
     """Return the mean, NaN of nothing."""
     return float(np.mean(values)) if len(values) else float("nan")
 
 
-def _ratio(part: float, whole: float) -> float:
+def _ratio_or_nan(part: float, whole: float) -> float:
     return part / whole if whole else float("nan")

@@ -7,7 +7,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.messages.columns import ORIGIN, STATE
-from components.messages.state_tracks import COVARIANCE, full_covariance, is_held
+from components.messages.state_tracks import (
+    COVARIANCE,
+    covariance_matrices,
+    is_confirmed_or_coasted,
+)
 from components.metrics.flown_flights import PlatformTracks
 from components.metrics.rows import PlatformParameters, is_named
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
@@ -59,7 +63,7 @@ _RESULTS = {
 
 
 class TrackingParameters(PlatformParameters):
-    """When tracks are compared with the truth, and what belongs together."""
+    """When tracks are compared with the truth, and how far a track may be from its target."""
 
     block: str | None = Field(
         default=None,
@@ -127,11 +131,16 @@ class Tracking(PlatformTracks):
             self._ends_s = [(k + 1) * self.p.series_s for k in range(many)]
 
     def results(self) -> list[Result]:
-        """Return errors, honesty, distances of sets, and identities."""
+        """Return the definitions of the results: errors, consistency, set distances and identity
+        scores, and the error over time.
+        """
         of = "" if self.p.block is None else f".{self.p.block}"
         series = [
             Result(
-                _column_at(end, of), NUMBER, f"normalised error squared up to {end:g} s", least=0.0
+                _nees_column_name(end, of),
+                NUMBER,
+                f"normalised error squared up to {end:g} s",
+                least=0.0,
             )
             for end in self._ends_s
         ]
@@ -142,32 +151,38 @@ class Tracking(PlatformTracks):
         return [*whole, *series]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return all of every replica."""
+        """Return every track score of each replica by result name."""
         columns: Any = group.tables[_TABLE]
         of = "" if self.p.block is None else f".{self.p.block}"
         outcome = {result.name: np.full(len(group), np.nan) for result in self.results()}
-        confirmed = is_held(columns["track_status"])
+        confirmed = is_confirmed_or_coasted(columns["track_status"])
         replica = np.asarray(columns["replica"])
         for number, scene in enumerate(group.scenes):
-            asked = self._is_asked_for(columns["block"], scene)
+            asked = self._is_of_wanted_block(columns["block"], scene)
             flights = self.flights(group, number)
             coverage = self.coverage(scene, flights)
             mine = np.flatnonzero((replica == number) & asked)
             tally, names = self._tally(
                 columns, mine, confirmed, flights[1:], float(group.duration_s[number])
             )
-            first = _first_detections(group.tables["detections"], number, self.blocks_on_board)
-            entered = coverage.entered_s(self.p.step_s, float(group.duration_s[number]))
+            first = _first_detection_times_s(
+                group.tables["detections"], number, self.blocks_on_board
+            )
+            entered = coverage.first_covered_s(self.p.step_s, float(group.duration_s[number]))
             values = tally.results(names, first, entered, float(group.duration_s[number]))
-            values |= innovation_results(*self._innovations(columns, mine[confirmed[mine]]))
+            values |= innovation_results(*self._nis_and_freedom(columns, mine[confirmed[mine]]))
             for name, value in values.items():
                 outcome[name + of][number] = value
             for end in self._ends_s:
-                outcome[_column_at(end, of)][number] = tally.last_nees(end - self.p.series_s, end)
+                outcome[_nees_column_name(end, of)][number] = tally.mean_nees_at_last_instant(
+                    end - self.p.series_s, end
+                )
         return outcome
 
-    def _is_asked_for(self, column: Any, scene: Scene) -> Any:
-        """Return which rows are of the block that is asked for, or of those that are last."""
+    def _is_of_wanted_block(self, column: Any, scene: Scene) -> Any:
+        """Return a mask of the rows (True) of the wanted block; by default of the blocks whose
+        output goes to no other recorded block.
+        """
         names = self.blocks_on_board(column.names)
         fed = {
             source for source, target in scene.graph.edges if source in names and target in names
@@ -188,10 +203,10 @@ class Tracking(PlatformTracks):
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
         grid = grid[grid >= self.p.from_s]
         kept = confirmed & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
-        key = _keys(columns)
+        key = _track_keys(columns)
         first, confirmed_row = np.unique(key[rows[kept[rows]]], return_index=True)
         confirmed_s = columns["time_s"][rows[kept[rows]][confirmed_row]]
-        instant, row = _valid_rows(columns, rows, grid)
+        instant, row = _reports_valid_at(columns, rows, grid)
         instant, row = instant[kept[row]], row[kept[row]]
         order = np.lexsort((row, instant))
         instant, row = instant[order], row[order]
@@ -205,7 +220,7 @@ class Tracking(PlatformTracks):
         as_reported[:, :, is_new] = state[:, is_new] - true
         state[:3] += state[3:] * since_s
         error = state - states_in_frame(targets, state_s + since_s, origin)[0]
-        covariance = np.moveaxis(full_covariance(columns, row), -1, 0)
+        covariance = np.moveaxis(covariance_matrices(columns, row), -1, 0)
         there = [np.broadcast_to(t.at(grid).present, grid.shape) for t in targets]
         present = np.array(there, dtype=bool).reshape(len(targets), len(grid))
         number, since = key[row], confirmed_s[np.searchsorted(first, key[row])]
@@ -219,30 +234,30 @@ class Tracking(PlatformTracks):
             tally.add(tracks, np.flatnonzero(present[:, k]))
         return tally, [target.name for target in targets]
 
-    def _innovations(self, columns: Any, rows: IntArray) -> tuple[FloatArray, IntArray]:
-        """Return the innovations of confirmed tracks, each once, and their degrees of freedom."""
+    def _nis_and_freedom(self, columns: Any, rows: IntArray) -> tuple[FloatArray, IntArray]:
+        """Return confirmed tracks' NIS, each once, and their degrees of freedom."""
         kept = (columns["nis_freedom"][rows] > 0) & (columns["state_s"][rows] >= self.p.from_s)
         rows = rows[kept]
         # A look that is worked on again, after an out-of-sequence one, is reported again.
-        track, when = _keys(columns)[rows], columns["state_s"][rows]
+        track, when = _track_keys(columns)[rows], columns["state_s"][rows]
         order = np.lexsort((when, track))
         same = (np.diff(track[order]) == 0) & (np.diff(when[order]) == 0)
         rows = rows[order[np.append(~same, np.ones(min(len(rows), 1), dtype=bool))]]
         return columns["nis"][rows], columns["nis_freedom"][rows]
 
 
-def _column_at(end_s: float, of: str) -> str:
+def _nees_column_name(end_s: float, of: str) -> str:
     return f"track_nees.time_s{of}.{end_s:g}"
 
 
-def _keys(columns: Any) -> IntArray:
-    """Return a number for each row's block and track: trackers number their own."""
+def _track_keys(columns: Any) -> IntArray:
+    """Return a number for each row that is unique for its block and track."""
     track = np.asarray(columns["track"], dtype=np.int64)
     return columns["block"].codes * (track.max(initial=0) + 1) + track
 
 
-def _valid_rows(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
-    """Return grid instants (indices) and the rows valid at them, block by block.
+def _reports_valid_at(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return pairs as two arrays: the index of a grid instant and a row that is valid at it.
 
     A report stands from its own instant until its block's next one. A block reports all of its
     tracks at once, and the end of each, so that one without rows was left without tracks before.
@@ -262,7 +277,7 @@ def _valid_rows(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArra
     return np.concatenate([none, *instants]), np.concatenate([none, *standing])
 
 
-def _first_detections(columns: Any, replica: int, on_board: Any) -> dict[str, float]:
+def _first_detection_times_s(columns: Any, replica: int, on_board: Any) -> dict[str, float]:
     names = columns["block"].names
     aboard = [names.index(name) for name in on_board(names)]
     mine = (np.asarray(columns["replica"]) == replica) & np.isin(columns["block"].codes, aboard)

@@ -14,7 +14,7 @@ from components.geometry import (
 )
 from components.messages.detections import SensorOffer
 from components.messages.reach import EVALUATE, Reach
-from components.metrics.separation import position_of, traffic_of
+from components.metrics.separation import position_of, traffic_and_duration
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.component import Context
 from dsa_des.scene.scene import Scene
@@ -55,33 +55,33 @@ def states_in_frame(
 
 
 class TargetsInFrame:
-    """Targets in one frame, north, east and down of an origin in deg and m; NaN if not there."""
+    """Targets in one north-east-down frame about a fixed origin (deg, m); NaN where absent."""
 
     def __init__(self, flights: Sequence[Any], origin: Sequence[float]) -> None:
         self._flights, self._origin = flights, np.array(origin)
         self.names = [flight.name for flight in flights]
 
     def position(self, flight: Any, time_s: FloatArray) -> FloatArray:
-        """Return where an aircraft is, (3, n), m."""
+        """Return an aircraft's position (north, east, down), (3, n), m; NaN where absent."""
         origin = np.repeat(self._origin[:, np.newaxis], len(time_s), axis=1)
         position, there = position_in_frame(flight, time_s, origin)
         return np.where(there, position, np.nan)
 
     def positions_at(self, time_s: FloatArray) -> FloatArray:
-        """Return where the targets are, (targets, 3, n), m."""
+        """Return all targets' positions in the frame, (targets, 3, n), m; NaN where absent."""
         result = [self.position(flight, time_s) for flight in self._flights]
         return np.array(result).reshape(len(result), 3, len(time_s))
 
     def states(self, time_s: FloatArray) -> FloatArray:
-        """Return positions and velocities, (targets, 6, n), m and m/s."""
+        """Return all targets' positions (m), velocities (m/s) in the frame, (targets, 6, n)."""
         before = np.maximum(time_s - _STEP_S, 0.0)
         after = before + 2.0 * _STEP_S
         velocity = (self.positions_at(after) - self.positions_at(before)) / (2.0 * _STEP_S)
         return np.concatenate([self.positions_at(time_s), velocity], axis=1)
 
 
-def reaches_of(scene: Scene, on: Collection[str] | None = None) -> list[Reach]:
-    """Return where the sensors of a scene, or those `on` a platform, look, in its body axes."""
+def sensor_reaches(scene: Scene, on: Collection[str] | None = None) -> list[Reach]:
+    """Return the body-axis reaches of a scene's sensors, or with `on` of the blocks so named."""
     result = []
     for name, block in scene.blocks.items():
         if "detections" not in block.cls.outputs or (on is not None and name not in on):
@@ -94,7 +94,7 @@ def reaches_of(scene: Scene, on: Collection[str] | None = None) -> list[Reach]:
 
 
 class Coverage:
-    """Whether targets lie in the field of view and within the range of any sensor.
+    """The region where some sensor sees targets: in its field of view and within range.
 
     Hills and the horizon are not asked, nor are manoeuvres of the ownship: it flies on. Of a
     platform `flights` are its own and those of all that it may see, and sensors those `on` it.
@@ -106,14 +106,14 @@ class Coverage:
         flights: Sequence[Any] | None = None,
         on: Collection[str] | None = None,
     ) -> None:
-        source, self.duration_s = traffic_of(scene)
+        source, self.duration_s = traffic_and_duration(scene)
         own, *targets = source.seen_from() if flights is None else flights
         #: The flights of who looks and of all targets.
         self.aircraft: tuple[Any, Sequence[Any]] = own, targets
-        self._reaches = reaches_of(scene, on)
+        self._reaches = sensor_reaches(scene, on)
 
-    def holds(self, target: Any, time_s: FloatArray) -> BoolArray:
-        """Return whether a target is covered at times (n,)."""
+    def is_covered(self, target: Any, time_s: FloatArray) -> BoolArray:
+        """Return when a target is present and in a sensor's reach, a mask (n,) of the times."""
         own, other = self.aircraft[0].at(time_s), target.at(time_s)
         ends = [
             np.ascontiguousarray(np.broadcast_to(value, time_s.shape))
@@ -129,11 +129,11 @@ class Coverage:
         there = np.broadcast_to(own.present & other.present, time_s.shape)
         result = np.zeros(time_s.shape, dtype=bool)
         for reach in self._reaches:
-            result |= reach.decide(*angles, distance, there) == EVALUATE
+            result |= reach.skip_reasons(*angles, distance, there) == EVALUATE
         return result
 
-    def entered_s(self, step_s: float, until_s: float = math.inf) -> dict[str, float]:
-        """Return when each target that ever is covered is so for the first time, to a millisecond.
+    def first_covered_s(self, step_s: float, until_s: float = math.inf) -> dict[str, float]:
+        """Return by name when each target is first covered, s, to a millisecond; others omitted.
 
         A stay shorter than `step_s` may be missed; a run may have ended early, at `until_s`.
         """
@@ -141,20 +141,20 @@ class Coverage:
         grid = np.append(np.arange(0.0, end_s, step_s), end_s)
         result = {}
         for target in self.aircraft[1]:
-            inside = self.holds(target, grid)
+            inside = self.is_covered(target, grid)
             if not inside.any():
                 continue
             first = int(np.argmax(inside))
             result[target.name] = float(grid[first])
             if first:
-                result[target.name] = self._entry(target, grid[first - 1], grid[first])
+                result[target.name] = self._entry_time_s(target, grid[first - 1], grid[first])
         return result
 
-    def _entry(self, target: Any, out_s: float, in_s: float) -> float:
-        """Return when a target enters that is outside at one time and inside at the other."""
+    def _entry_time_s(self, target: Any, out_s: float, in_s: float) -> float:
+        """Return when a target enters the coverage, s, by bisection of times outside and in."""
         for _ in range(math.ceil(math.log2(max((in_s - out_s) / _WELL_S, 1.0)))):
             middle = 0.5 * (out_s + in_s)
-            if self.holds(target, np.array([middle]))[0]:
+            if self.is_covered(target, np.array([middle]))[0]:
                 in_s = middle
             else:
                 out_s = middle

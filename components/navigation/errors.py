@@ -28,10 +28,10 @@ from components.geometry import (
     POSE_FIELDS,
     body_angles,
     body_to_ned,
-    level_parts,
+    meridian_convergence_rad,
     ned_to_body,
+    north_east_parts,
     radii_of_curvature,
-    turn_of_north_rad,
     unit_vector,
     wrap_two_pi,
 )
@@ -55,7 +55,8 @@ def displaced_position(
     east_m: ArrayLike,
     down_m: ArrayLike,
 ) -> tuple[Any, Any, Any]:
-    """Return positions moved by an error of at most 100 km in each of their own axes.
+    """Return the latitude, longitude and altitude of positions displaced by offsets (each at most
+    100 km) in their own north-east-down axes.
 
     The displacement is an arc along a sphere with the local radii of the ellipsoid, so it also
     works across a pole. Against a straight displacement in the tangent plane an error of 10 m
@@ -84,7 +85,7 @@ def displaced_position(
 
 
 def _add_error(value: FloatArray, error: FloatArray) -> FloatArray:
-    """Return values that are off by errors; every bit stays where there is none."""
+    """Return values plus errors; values with an error of 0 stay unchanged to the bit."""
     return np.where(error == 0.0, value, value + error)
 
 
@@ -112,7 +113,7 @@ Belief = dict[str, FloatArray]
 
 
 class Believing(Protocol):
-    """Gives what the ownship believes of itself."""
+    """Function that returns the ownship's believed position and attitude."""
 
     def __call__(self, states: TrafficStates, /) -> Belief:
         """Return position and attitude at each instant, by name."""
@@ -128,27 +129,29 @@ _OWNSHIP = np.uint64(0)
 _LEAST_COS = 1e-3
 
 
-def navigation_errs(context: Context) -> bool:
-    """Return whether the scene has errors of navigation."""
-    return bool(_errors_of(context))
+def has_navigation_errors(context: Context) -> bool:
+    """Return whether the scene has any navigation error other than 0."""
+    return bool(_nonzero_error_texts(context))
 
 
-def navigation_noise(context: Context) -> tuple[Three, Three]:
-    """Return the standard deviations that the ownship's navigation states of itself."""
+def navigation_noise_deviations(context: Context) -> tuple[Three, Three]:
+    """Return the standard deviations that the navigation states: of position (north, east, down; m)
+    and attitude (yaw, pitch, roll; rad).
+    """
     navigation = context.sections.get("navigation")
     if navigation is None:
         return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     return navigation.position_noise_m, _radians(navigation.attitude_noise_deg)
 
 
-def lasting_navigation(context: Context) -> dict[str, list[LastingPart]]:
-    """Return what noise of navigation is in errors that last, by measured quantity.
+def lasting_navigation_errors(context: Context) -> dict[str, list[LastingPart]]:
+    """Return the correlated parts of errors caused by navigation, by measured quantity.
 
     Each angle has of each turn at most its noise, each direction of the position's noise at most
     the greatest.
     """
     navigation = context.sections["navigation"]
-    position_m, attitude_rad = navigation_noise(context)
+    position_m, attitude_rad = navigation_noise_deviations(context)
     angle: list[LastingPart] = []
     along: list[LastingPart] = []
     if lasts_s := navigation.attitude_correlation_time_s:
@@ -159,7 +162,7 @@ def lasting_navigation(context: Context) -> dict[str, list[LastingPart]]:
     return {"azimuth": angle, "elevation": angle, "range": along}
 
 
-def _errors_of(context: Context) -> list[str]:
+def _nonzero_error_texts(context: Context) -> list[str]:
     navigation = context.sections.get("navigation")
     return [
         f"{key} is {[float(value) for value in values]}"
@@ -174,19 +177,19 @@ class _Navigation(Effect[Built]):
 
     def verdict(self, block: Any) -> Verdict:
         """Return whether navigation errors are simulated: needs ``[navigation]``."""
-        errors = _errors_of(block.context)
+        errors = _nonzero_error_texts(block.context)
         if errors:
             return Verdict(True, f"[navigation] {' and '.join(errors)}")
         return Verdict(False, "[navigation] has no bias and no noise")
 
 
 class NavigationErrors(_Navigation[Believing]):
-    """What the ownship believes of its position and attitude: biases, and noise that lasts."""
+    """The ownship's believed pose: the true one with biases and white or correlated noise."""
 
     acts_on = OWNSHIP
 
     def build(self, block: Any) -> Believing:
-        """Return what gives the belief at each instant.
+        """Return a function giving the ownship's believed position and attitude for each row.
 
         All transforms on a platform share its one navigation system: its noise is keyed by the
         instant and the platform's name, not by the block.
@@ -223,7 +226,7 @@ class NavigationErrors(_Navigation[Believing]):
             if lasting[0] is not None:
                 # Fixed to the Earth: near a pole, where north turns about, the error does not.
                 outward = lasting[0](_OWNSHIP, instant, 3, states.run)
-                normals[:2] = level_parts(
+                normals[:2] = north_east_parts(
                     normals[0], normals[1], outward, states.own_lat_deg, states.own_lon_deg
                 )
             errors = [bias[k] + noise[k] * normal for k, normal in enumerate(normals)]
@@ -231,7 +234,7 @@ class NavigationErrors(_Navigation[Believing]):
             position = displaced_position(*true, states.own_alt_m, *errors[:3])
             # How it is turned it knows from where it believes north to be.
             near = np.abs(true[0]) > NEAR_A_POLE_DEG
-            turned = np.where(near, turn_of_north_rad(true, position[:2]), 0.0)
+            turned = np.where(near, meridian_convergence_rad(true, position[:2]), 0.0)
             errors[3] = errors[3] + turned
             attitude = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
             return dict(
@@ -242,14 +245,16 @@ class NavigationErrors(_Navigation[Believing]):
 
 
 class NavigationReport(_Navigation[ReportTransform]):
-    """The line of sight of every detection in the horizon's axes, as the ownship believes them."""
+    """Adds to detections their line of sight in north-east-down axes by the believed attitude."""
 
     acts_on = REPORT
 
     def build(self, block: Any) -> ReportTransform:
-        """Return what adds the columns to a report, and to its variances what navigation knows."""
+        """Return a function that adds horizon angles and the navigation's variances to a report."""
         none = (0.0, 0.0, 0.0)
-        noise = navigation_noise(block.context) if block.turned_by_belief else (none, none)
+        noise = (
+            navigation_noise_deviations(block.context) if block.turned_by_belief else (none, none)
+        )
 
         def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
             return add_navigation_variances(add_horizon_angles(detections, targets, rows), *noise)
@@ -260,7 +265,9 @@ class NavigationReport(_Navigation[ReportTransform]):
 def add_horizon_angles(
     detections: Detections, targets: RelativeTargets, rows: IntArray
 ) -> Detections:
-    """Add each detection's line of sight in NED, by what the ownship believes of its attitude."""
+    """Return the detections with azimuth and elevation in north-east-down axes added, by the
+    believed attitude; unchanged without a pose.
+    """
     own = detections.pose_columns()
     if not own:
         return detections
@@ -278,7 +285,7 @@ def add_horizon_angles(
 def add_navigation_variances(
     detections: Detections, position_m: Three, attitude_rad: Three
 ) -> Detections:
-    """Add to a report's variances those of the pose that its measurements are turned by."""
+    """Return detections with navigation's variance added to azimuth, elevation and range's."""
     own = detections.pose_columns()
     if not own or not (any(position_m) or any(attitude_rad)) or not len(detections.target):
         return detections

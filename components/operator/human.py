@@ -37,14 +37,16 @@ class ConsoleParameters(ClockedParameters):
 
 
 class _Alert(NamedTuple):
-    """An alert as the operator has it: its level, and the tick at which it came."""
+    """An active alert: its level, and the tick at which it began."""
 
     level: int
     tick: int
 
 
 class Taken(NamedTuple):
-    """When a decision was taken in, s, and which earlier command it replaces."""
+    """When a decision was accepted, when its turn or climb ends, and when an earlier command that
+    it replaces was accepted, s.
+    """
 
     time_s: float
     ends_s: float = math.nan  # When a turn or a climb is flown; NaN for others
@@ -69,8 +71,8 @@ class Console(Component):
         #: The last turn and the last climb, by kind.
         self._told: dict[int, Taken] = {}
 
-    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
-        """Return the decisions that come at the scans of a wake, with their ticks, in order."""
+    def due_decisions(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
+        """Return the decisions due at the scans of this call, as (tick, decision) in order."""
         raise NotImplementedError
 
     def run(self, wake: Wake) -> Mapping[str, Message] | None:
@@ -78,7 +80,7 @@ class Console(Component):
         came = list(wake.arrivals("alerts"))
         index = 0
         made = []
-        for tick, decision in self.due(wake):
+        for tick, decision in self.due_decisions(wake):
             index = self._take_alerts(came, index, tick)
             taken = self._schedule_command(tick / self.context.ticks_per_s, decision)
             made.append((tick, decision, self._alerts.get(decision.target), taken))
@@ -90,14 +92,14 @@ class Console(Component):
         return sent
 
     def acknowledge(self, taken: Sequence[Taken]) -> None:
-        """Acknowledge the due decisions to their senders, in order."""
+        """Tell the senders of the due decisions, in the same order, how each was accepted."""
 
     def _schedule_command(self, time_s: float, decision: OperatorDecision) -> Taken:
-        """Return when a decision is flown, and what it replaces.
+        """Return when a decision was accepted, its manoeuvre's end, and which one it replaces.
 
         A turn replaces a turn and a climb a climb; one of each is flown at the same time.
         """
-        if not _is_flown(decision):
+        if not _is_manoeuvre(decision):
             return Taken(time_s)
         flown = self._manoeuvre(decision)
         if decision.kind == TURN:
@@ -111,7 +113,7 @@ class Console(Component):
         return taken
 
     def _take_alerts(self, came: list[Arrivals], row: int, until: int | None) -> int:
-        """Process alerts from a row on that came by an instant; return the next row."""
+        """Update the alerts by rows from `row` to tick `until` (None: all); return the next row."""
         for arrived in came:  # one wire
             alerts: AlertLevels = arrived.message
             rows = len(alerts)
@@ -119,14 +121,14 @@ class Console(Component):
                 rows = int(np.searchsorted(arrived.tick, until, side="right"))
             for index in range(row, rows):
                 entries = slice(int(alerts.offsets[index]), int(alerts.offsets[index + 1]))
-                self._alerts = self._update_alerts(alerts, entries, int(arrived.tick[index]))
+                self._alerts = self._active_alerts(alerts, entries, int(arrived.tick[index]))
             row = max(row, rows)
         return row
 
-    def _update_alerts(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
-        """Return the alerts that are on once a row of levels has come."""
+    def _active_alerts(self, alerts: AlertLevels, entries: slice, tick: int) -> dict[str, _Alert]:
+        """Return active alerts by contact name after one row, each with its beginning tick."""
         now = {}
-        level, contacts = alerts.level[entries], alerts.contacts()[entries]
+        level, contacts = alerts.level[entries], alerts.contact_numbers()[entries]
         for index in np.flatnonzero(level > 0).tolist():
             name = contact_name(alerts.roster.names, int(contacts[index])) or ""
             began = self._alerts.get(name)
@@ -155,7 +157,7 @@ class Console(Component):
             np.array([taken.replaces_s for *_, taken in made]),
             self._targets,
         )
-        flown = [(tick, self._manoeuvre(d)) for tick, d, *_ in made if _is_flown(d)]
+        flown = [(tick, self._manoeuvre(d)) for tick, d, *_ in made if _is_manoeuvre(d)]
         if not flown:
             return {"decisions": decisions}
         manoeuvres = Manoeuvres.of([tick for tick, _ in flown], [one for _, one in flown])
@@ -168,7 +170,7 @@ class Console(Component):
         return Manoeuvre(climb_m=decision.climb_m, climb_rate_mps=self.p.vertical_rate_mps)
 
 
-def _is_flown(decision: OperatorDecision) -> bool:
+def _is_manoeuvre(decision: OperatorDecision) -> bool:
     if decision.kind == TURN:
         return abs(decision.turn_rad) >= _LEAST_TURN_RAD
     return decision.kind == CLIMB and abs(decision.climb_m) >= _LEAST_CLIMB_M
@@ -180,14 +182,14 @@ MOST_WAITING = 32
 
 @dataclass(frozen=True)
 class PendingDecision:
-    """A decision that waits on the desk, and what is called when it is taken in."""
+    """A decision that waits on the desk, and the function to call when it is accepted."""
 
     decision: OperatorDecision
     taken: Callable[[Taken], None]  # From the thread of the simulation
 
 
 class Desk:
-    """Decisions in the order in which they came; one thread puts them there, another takes them."""
+    """Queue of decisions; one thread adds them, the thread of the simulation removes them."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -195,7 +197,7 @@ class Desk:
         self._open = True
 
     def submit(self, pending: PendingDecision) -> bool:
-        """Add a decision to the desk; return False if the run is over or too many wait."""
+        """Queue a decision; return True if added, False if the run is over or too many wait."""
         with self._lock:
             if not self._open or len(self._waiting) >= MOST_WAITING:
                 return False
@@ -209,7 +211,7 @@ class Desk:
         return result
 
     def close(self) -> list[PendingDecision]:
-        """Close the desk; return decisions that were never taken, and so never acknowledged."""
+        """Close the queue and return the decisions that were never accepted."""
         with self._lock:
             self._open = False
             result, self._waiting = self._waiting, []
@@ -237,8 +239,8 @@ class Human(Console):
     desk: Desk | None = None
     _taken: Sequence[PendingDecision] = ()
 
-    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
-        """Return the decisions that wait on the desk."""
+    def due_decisions(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
+        """Remove and return the desk's waiting decisions, each with this call's latest tick."""
         if self.desk is None:
             return []
         tick = int(wake.ticks[-1])
@@ -246,7 +248,7 @@ class Human(Console):
         return [(tick, pending.decision) for pending in self._taken]
 
     def acknowledge(self, taken: Sequence[Taken]) -> None:
-        """Tell each page whether its decision was taken."""
+        """Report to the sender of each decision when it was accepted and what it replaces."""
         for pending, one in zip(self._taken, taken, strict=True):
             pending.taken(one)
 

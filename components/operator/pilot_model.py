@@ -21,7 +21,7 @@ _DEGREE = math.pi / 180.0
 
 
 class Excess(NamedTuple):
-    """How far beyond the least change a pilot steers: a gamma distribution, shifted."""
+    """How far beyond the smallest sufficient change a pilot steers: a shifted gamma law."""
 
     shape: float
     scale: float  # What is drawn is multiplied by the one, and lessened by the other
@@ -38,42 +38,44 @@ CLIMB = Excess(9.73, 207.98 * FOOT_M, 1500.0 * FOOT_M, 500.0 * FOOT_M)
 _PAUSES = ((12.0, 12.0), (9.0, 6.0), (6.0, 3.0), (6.0, 3.0))
 
 
-def exponential(uniform: float, mean: float) -> float:
-    """Return a draw of the exponential distribution from one in [0, 1)."""
+def exponential_quantile(uniform: float, mean: float) -> float:
+    """Return the value of an exponential distribution for a uniform number in [0, 1)."""
     return -mean * math.log1p(-uniform)
 
 
-def gamma(uniform: float, shape: float, scale: float) -> float:
-    """Return a draw of the gamma distribution from one in [0, 1)."""
+def gamma_quantile(uniform: float, shape: float, scale: float) -> float:
+    """Return the value of a gamma distribution for a uniform number in [0, 1)."""
     from scipy.special import gammaincinv  # only who draws pays for its import
 
     return float(scale * gammaincinv(shape, uniform))
 
 
-def pause_s(level: int, uniform: float) -> float:
-    """Return how long a pilot waits before deciding again."""
+def decision_pause_s(level: int, uniform: float) -> float:
+    """Return a pilot's pause (s) before the next decision, for a uniform number in [0, 1)."""
     least, mean = _PAUSES[min(max(level, 0), len(_PAUSES) - 1)]
-    return least + exponential(uniform, mean)
+    return least + exponential_quantile(uniform, mean)
 
 
-def mean_pause_s(level: int) -> float:
-    """Return the mean of `pause_s`."""
+def mean_decision_pause_s(level: int) -> float:
+    """Return the mean pause of a pilot before the next decision at an alert level, s."""
     least, mean = _PAUSES[min(max(level, 0), len(_PAUSES) - 1)]
     return least + mean
 
 
 class Draws(NamedTuple):
-    """What is drawn for one steering decision, each in [0, 1)."""
+    """Uniform numbers in [0, 1) for one steering decision."""
 
     follows: float
     side: float
     size: float
 
 
-def steering(
+def commanded_change(
     changes: tuple[float, float], turns: bool, draws: Draws | None, goes_beyond: bool = True
 ) -> float:
-    """Return the change that a pilot makes, of the sign of its side."""
+    """Return the change of track (rad, positive right) or altitude (m, positive up) that a pilot
+    commands to leave the band (low, high).
+    """
     low, high = changes
     if math.isinf(low) and math.isinf(high):
         return 0.0
@@ -88,21 +90,21 @@ def steering(
         excess = TURN if to_high == smaller_is_high else TURN_OTHER_SIDE
     beyond = excess.fixed if goes_beyond else 0.0
     if draws is not None and goes_beyond:
-        beyond = gamma(draws.size, excess.shape, excess.scale) - excess.less
+        beyond = gamma_quantile(draws.size, excess.shape, excess.scale) - excess.less
     size = max((high if to_high else -low) + beyond, 0.0)
     if turns:
         size = min(size, math.pi)
     return size if to_high else -size
 
 
-def response_s(
+def response_delays_s(
     uniforms: Sequence[float] | None, initial_s: float, coordination_s: float, execution_s: float
 ) -> tuple[float, float]:
-    """Return how long a pilot takes to react and coordinate, and then to begin the manoeuvre."""
+    """Return the delay of reaction and coordination, and the delay of execution after it, s."""
     if uniforms is None:
         return initial_s + coordination_s, execution_s
     first, second, third = uniforms
-    waits_s = exponential(first, initial_s)
+    waits_s = exponential_quantile(first, initial_s)
     if coordination_s > 0.0:
-        waits_s += gamma(second, COORDINATION_SHAPE, coordination_s / COORDINATION_SHAPE)
-    return waits_s, exponential(third, execution_s)
+        waits_s += gamma_quantile(second, COORDINATION_SHAPE, coordination_s / COORDINATION_SHAPE)
+    return waits_s, exponential_quantile(third, execution_s)

@@ -23,15 +23,15 @@ _MOST_PROBLEMS = 5
 
 
 def _zero_if_empty(value: Any) -> Any:
-    """Return 0 for an empty cell."""
+    """Return 0.0 for an empty cell (None or an empty text), else the value."""
     return 0.0 if value is None or value == "" else value
 
 
-def _unknown(value: Any) -> Any:
+def _nan_if_empty(value: Any) -> Any:
     return math.nan if value is None or value == "" else value
 
 
-def _blank_to_none(value: Any) -> Any:
+def _none_to_blank(value: Any) -> Any:
     return "" if value is None else value
 
 
@@ -40,14 +40,14 @@ class _DecisionRow(BaseModel):
 
     time_s: float = Field(ge=0, allow_inf_nan=False)
     decision: Literal["shown", "looked", "verified", "rejected", "turn", "climb"]
-    target: Annotated[str, BeforeValidator(_blank_to_none)] = ""
+    target: Annotated[str, BeforeValidator(_none_to_blank)] = ""
     turn_rad: Annotated[
         float, BeforeValidator(_zero_if_empty), Field(ge=-MOST_TURN_RAD, le=MOST_TURN_RAD)
     ] = 0.0
     climb_m: Annotated[
         float, BeforeValidator(_zero_if_empty), Field(ge=-MOST_CLIMB_M, le=MOST_CLIMB_M)
     ] = 0.0
-    wall_time_s: Annotated[float, BeforeValidator(_unknown)] = math.nan
+    wall_time_s: Annotated[float, BeforeValidator(_nan_if_empty)] = math.nan
 
     def to_decision(self) -> OperatorDecision:
         kind = KINDS.index(self.decision)
@@ -57,7 +57,7 @@ class _DecisionRow(BaseModel):
 
 
 def read_decisions(path: Path) -> list[tuple[float, OperatorDecision]]:
-    """Return the decisions of a table with their times, s, in order.
+    """Return the decisions of a table with their times, as (time in s, decision) in order.
 
     The path is a run's ``decisions.parquet``, its folder, or a CSV file with the columns ``time_s``
     and ``decision``, and where they are needed ``target``, ``turn_rad``, ``climb_m`` and
@@ -151,8 +151,8 @@ class RecordedOperator(Console):
         self._decided = tuple(decision for _, decision in result)
         self._next = 0
 
-    def due(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
-        """Return what is due since the last scan."""
+    def due_decisions(self, wake: Wake) -> Sequence[tuple[int, OperatorDecision]]:
+        """Return the recorded decisions due since the last scan, as (tick of scan, decision)."""
         scans = wake.ticks[wake.scans >= 0]
         if len(scans) == 0 or self._next == len(self._decided):
             return []

@@ -11,18 +11,24 @@ from components.flights.point_mass import LEAST_EASING_S
 from components.guidance.daidalus import ConfParameters, changes_out_of_bands, explain_no_steering
 from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
-from components.operator.pilot_model import Draws, mean_pause_s, pause_s, response_s, steering
-from dsa_des.arrays.keyed_table import occurrences_by_turn
+from components.operator.pilot_model import (
+    Draws,
+    commanded_change,
+    decision_pause_s,
+    mean_decision_pause_s,
+    response_delays_s,
+)
+from dsa_des.arrays.keyed_table import indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 from dsa_des.time.clock import nanosecond_of
 
 
 class StochasticParameters(ConfParameters):
-    """Parameters of the operator."""
+    """Parameters of a stochastic pilot."""
 
     level: int = Field(default=2, ge=1, description="Act when an alert is of this level or above.")
     held_s: float = Field(default=4.0, ge=0, description="How long it must have been so, s.")
@@ -95,7 +101,7 @@ class StochasticParameters(ConfParameters):
 
 
 class Mind(NamedTuple):
-    """What an operator has in mind, in one run."""
+    """State of one run's pilot: when alerts began, and when the pilot decides, chooses and acts."""
 
     run: int
     decisions: int = 0  # How many there were
@@ -133,12 +139,12 @@ class Stochastic(Component):
 
     @classmethod
     def may_climb(cls, parameters: StochasticParameters) -> bool:
-        """Return whether it ever commands another altitude."""
+        """Return whether the pilot can change the altitude: not if all manoeuvres are turns."""
         return parameters.turn_share < 1.0
 
     def setup(self) -> None:
         """Read the configuration; start without an alert."""
-        self._configuration, self._alerter = self.p.read()
+        self._configuration, self._alerter = self.p.read_configuration()
         self._response, self._steering, self._pause = map(
             self.stream, ("response", "steering", "pause")
         )
@@ -150,7 +156,7 @@ class Stochastic(Component):
         self._stuck = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often it was to steer, and no change led clear, by run."""
+        """Return by run how often the pilot had to steer but found no change leading clear."""
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
@@ -164,34 +170,36 @@ class Stochastic(Component):
         alerts: AlertLevels | None = wake["alerts"]
         if alerts is None:
             return None
-        highest, runs = alerts.highest(), wake.run
+        highest, runs = alerts.highest_levels(), wake.run
         choosing: list[tuple[int, Mind]] = []
         acting: list[tuple[int, int]] = []
-        has_to_do = np.flatnonzero(self._has_to_do(wake, highest))
-        for turn in occurrences_by_turn(
+        has_to_do = np.flatnonzero(self._may_change_state(wake, highest))
+        for turn in indices_by_occurrence(
             runs[has_to_do]
         ):  # the first row of every run, then the next
             rows = has_to_do[turn]
             minds = [self._minds.get(run, Mind(run)) for run in runs[rows].tolist()]
-            chooses, acts = self._follow(minds, wake.ticks[rows], highest[rows].tolist())
+            chooses, acts = self._update_minds(minds, wake.ticks[rows], highest[rows].tolist())
             for mind in minds:
-                self._minds[mind.run], self._next[mind.run] = mind, self._next_tick(mind)
+                self._minds[mind.run], self._next[mind.run] = mind, self._earliest_change_tick(mind)
             choosing += [(int(rows[k]), minds[k]) for k in chooses]
             acting += [(int(rows[k]), minds[k].run) for k in acts]
         return Manoeuvres.at_rows(wake.instants, self._begin_manoeuvres(alerts, choosing, acting))
 
-    def _has_to_do(self, wake: Wake, highest: IntArray) -> BoolArray:
-        """Return at which rows a state may change: with an alert, or after one has ended."""
+    def _may_change_state(self, wake: Wake, highest: IntArray) -> BoolArray:
+        """Return a mask of the rows (True) at which the pilot's state may change."""
         missing = int(wake.run.max(initial=-1)) + 1 - len(self._next)
         self._next = np.concatenate([self._next, np.full(max(0, missing), np.inf)])
         alerted, due = highest >= self.p.level, self._next[wake.run]
         has_alert = due < np.inf
-        if len(wake.instants.last_of_each) < len(wake):  # who is followed at one row is so later
+        if len(wake.instants.last_position_of_runs) < len(
+            wake
+        ):  # who is followed at one row is so later
             return np.isin(wake.run, wake.run[alerted | has_alert])
         return (alerted != has_alert) | (alerted & (wake.ticks >= due))
 
-    def _next_tick(self, mind: Mind) -> float:
-        """Return a tick before which an alert that goes on changes nothing; never without one."""
+    def _earliest_change_tick(self, mind: Mind) -> float:
+        """Return the first tick at which an alert may change the pilot's state; else infinite."""
         if mind.since is None:
             return math.inf
         if mind.acts_at is None:
@@ -206,7 +214,7 @@ class Stochastic(Component):
         acting: Sequence[tuple[int, int]],
     ) -> dict[int, Manoeuvre]:
         """Return the manoeuvres that begin, by row; what is chosen and not begun is kept."""
-        chosen = self._manoeuvres_at(alerts, choosing)
+        chosen = self._chosen_manoeuvres(alerts, choosing)
         latest: dict[int, Manoeuvre | None] = {}
         begins = sorted([(index, 0, mind.run) for index, mind in choosing]
                         + [(index, 1, run) for index, run in acting])  # fmt: skip
@@ -220,10 +228,12 @@ class Stochastic(Component):
             self._minds[run] = self._minds[run]._replace(chosen=told)
         return sent
 
-    def _follow(
+    def _update_minds(
         self, minds: list[Mind], ticks: IntArray, highest: Sequence[int]
     ) -> tuple[list[int], list[int]]:
-        """Update operators, one a run, with the highest level; return who chooses and who acts."""
+        """Update one pilot per run in place by its highest alert level; return the indices of those
+        who choose and of those who act now.
+        """
         per_s, at = self.context.ticks_per_s, ticks.tolist()
         early = self.p.chooses == "before_executing"
         for k, mind in enumerate(minds):
@@ -234,7 +244,9 @@ class Stochastic(Component):
         deciding = [k for k, mind in enumerate(minds) if self._decides(mind, at[k])]
         for k in deciding:
             minds[k] = minds[k]._replace(decisions=minds[k].decisions + 1)
-        drawn = self._drawn(self._response, 3, [minds[k] for k in deciding], ticks[deciding])
+        drawn = self._draw_uniforms(
+            self._response, 3, [minds[k] for k in deciding], ticks[deciding]
+        )
         for k, draws in zip(deciding, drawn, strict=True):
             waits_s, executes_s = self._response_s(minds[k], highest[k], draws)
             acts_at = at[k] + (waits_s + executes_s) * per_s
@@ -244,9 +256,13 @@ class Stochastic(Component):
             k for k, mind in enumerate(minds)
             if mind.chooses_at is not None and at[k] >= mind.chooses_at
         ]  # fmt: skip
-        drawn = self._drawn(self._pause, 1, [minds[k] for k in choosing], ticks[choosing])
+        drawn = self._draw_uniforms(self._pause, 1, [minds[k] for k in choosing], ticks[choosing])
         for k, draws in zip(choosing, drawn, strict=True):
-            wait_s = mean_pause_s(highest[k]) if draws is None else pause_s(highest[k], draws[0])
+            wait_s = (
+                mean_decision_pause_s(highest[k])
+                if draws is None
+                else decision_pause_s(highest[k], draws[0])
+            )
             minds[k] = minds[k]._replace(chooses_at=None, free_from=at[k] + wait_s * per_s)
         acting = [
             k for k, mind in enumerate(minds)
@@ -257,7 +273,7 @@ class Stochastic(Component):
         return choosing, acting
 
     def _decides(self, mind: Mind, tick: int) -> bool:
-        """Return whether the pilot decides at an instant."""
+        """Return whether the pilot decides now: alert long enough, no pause or action pending."""
         if mind.since is None or mind.acts_at is not None:
             return False
         early = self.p.chooses == "before_executing"
@@ -265,10 +281,10 @@ class Stochastic(Component):
         free = tick > mind.free_from if early and mind.has_acted else tick >= mind.free_from
         return free and tick - mind.since >= self.p.held_s * self.context.ticks_per_s
 
-    def _drawn(
+    def _draw_uniforms(
         self, stream: Any, count: int, minds: Sequence[Mind], ticks: IntArray
     ) -> list[list[float]] | list[None]:
-        """Return the first draws of the latest decision of each mind, made at ticks (minds,)."""
+        """Return each pilot's `count` uniform numbers for the decision; None if deterministic."""
         if self.p.deterministic or not minds:
             return [None] * len(minds)
         decisions = np.array([mind.decisions for mind in minds], dtype=np.int64)
@@ -288,18 +304,18 @@ class Stochastic(Component):
             initial_s = coordination_s = 0.0
         elif highest >= self.p.warning_level:
             coordination_s = 0.0
-        return response_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
+        return response_delays_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
 
-    def _manoeuvres_at(
+    def _chosen_manoeuvres(
         self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
     ) -> dict[int, Manoeuvre]:
-        """Return what operators who act at some rows of the alerts steer, by row."""
+        """Return the manoeuvres that pilots choose at given alert rows, by row; others omitted."""
         if not acting:
             return {}
         by_turn: dict[int, bool] = {}
         draws: dict[int, Draws | None] = {}
         minds, ticks = [mind for _, mind in acting], alerts.tick[[index for index, _ in acting]]
-        drawn = self._drawn(self._steering, 4, minds, ticks)
+        drawn = self._draw_uniforms(self._steering, 4, minds, ticks)
         for (index, _), four in zip(acting, drawn, strict=True):
             by_turn[index], draws[index] = self.p.turn_share >= 0.5, None
             if four is not None:
@@ -320,7 +336,7 @@ class Stochastic(Component):
                     change = 0.0
                     if changes is not None:
                         needed.add(row)
-                        change = steering(changes, is_turn, draws[row], self.p.goes_beyond)
+                        change = commanded_change(changes, is_turn, draws[row], self.p.goes_beyond)
                     if change != 0.0 and is_turn:
                         result[row] = self._turn(change, alerts, row)
                     elif change != 0.0:
@@ -329,11 +345,11 @@ class Stochastic(Component):
                         )
         due = np.array(sorted(needed), dtype=np.int64)
         stuck = np.array([row not in result for row in due.tolist()], dtype=bool)
-        self._stuck = count_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
+        self._stuck = add_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
         return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:
-        """Return a turn by a change of the track that the ownship has in a row of the alerts."""
+        """Return the turn by a change (rad, positive right) from the track in an alert row."""
         own = alerts.own_motion
         track = math.atan2(float(own["east_mps"][row]), float(own["north_mps"][row]))
         track %= 2.0 * math.pi

@@ -17,8 +17,8 @@ from components.sensor.look import Cells, aspect_angles_of_cells
 from dsa_des.arrays.types import FloatArray
 
 
-def table_of_targets(roster: Roster, path: str) -> list[Any]:
-    """Return every target's own table over aspect."""
+def aspect_tables_of_targets(roster: Roster, path: str) -> list[Any]:
+    """Return every target's own silhouette table, one per target; ValueError if one has none."""
     tables, place = roster.tables(path)
     missing = np.flatnonzero(place < 0)
     if missing.size:
@@ -32,7 +32,7 @@ def table_of_targets(roster: Roster, path: str) -> list[Any]:
 
 
 def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: str) -> FloatArray:
-    """Look each cell's area up in what its target has: a table over aspect, or a mesh."""
+    """Return each cell's area from its target's silhouette table or mesh, m²."""
     ((kind, measured),) = of_target.items()
     distinct = list({id(item): item for item in measured}.values())
     which = np.array([next(i for i, d in enumerate(distinct) if d is m) for m in measured])
@@ -59,7 +59,7 @@ MESH_ROWS = 64
 def silhouette_table_of_bodies(
     front_m2: float, side_m2: float, horizontal_m2: float, back_m2: float | None = None
 ) -> SilhouetteTable:
-    """Return the silhouette of the union of the three bodies at every 5 degrees of aspect."""
+    """Return the three bodies' united silhouette area, every 5 degrees of azimuth, elevation."""
     azimuth_deg = np.arange(0.0, 360.0, STEP_DEG)
     elevation_deg = np.linspace(-90.0, 90.0, round(180.0 / STEP_DEG) + 1)
     azimuth, elevation = (grid.reshape(-1) for grid in np.meshgrid(azimuth_deg, elevation_deg))
@@ -82,7 +82,7 @@ def silhouette_table_of_bodies(
 
 @lru_cache(maxsize=64)
 def body_mesh(front_m2: float, side_m2: float, horizontal_m2: float) -> TriangleMesh:
-    """Return a closed mesh of the capsule and the plate."""
+    """Return a closed triangle mesh of the capsule and the plate that have these areas."""
     if min(front_m2, side_m2, horizontal_m2) <= 0.0:
         raise ValueError("an aircraft without front, side or horizontal area has no mesh")
     bodies = [_capsule(front_m2, side_m2), _plate(horizontal_m2)]
@@ -92,7 +92,7 @@ def body_mesh(front_m2: float, side_m2: float, horizontal_m2: float) -> Triangle
 
 
 def _capsule(front_m2: float, side_m2: float) -> tuple[FloatArray, np.ndarray]:
-    """Return rings round the x axis; their radius makes the polygon's area that of the circle."""
+    """Return vertices and faces of a capsule along the x axis."""
     radius = np.sqrt(front_m2 / np.pi)
     half_length = side_m2 / (4.0 * radius)
     turn = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
@@ -133,9 +133,9 @@ _BODIES = ("front_m2", "side_m2", "horizontal_m2")
 
 
 def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
-    """Check that every target has what a camera's silhouette needs."""
+    """Raise ValueError if a target lacks what the camera's kind of silhouette needs."""
     if silhouette == "aspect_table":
-        table_of_targets(roster, f"{band}.silhouette_table")
+        aspect_tables_of_targets(roster, f"{band}.silhouette_table")
     elif silhouette == "mesh":
         for name, craft in zip(roster.names, roster.aircraft, strict=True):
             of: Any = getattr(craft, band)
@@ -151,8 +151,8 @@ def check_silhouette(roster: Roster, band: str, silhouette: str) -> None:
                 )
 
 
-def warn_of_other_fits(roster: Roster, band: str, silhouette: str) -> list[str]:
-    """Warn of targets whose areas were fitted as a union and that are shown as single bodies."""
+def area_fit_warnings(roster: Roster, band: str, silhouette: str) -> list[str]:
+    """Return a warning in a list if areas fitted for the union are used with single bodies."""
     if silhouette not in ("exact", "thesis"):
         return []
     names = [
@@ -170,9 +170,9 @@ def warn_of_other_fits(roster: Roster, band: str, silhouette: str) -> list[str]:
 
 
 def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
-    """Return each cell's area."""
+    """Return the silhouette area of each cell's target by the given model, m²."""
     if silhouette == "aspect_table":
-        tables = table_of_targets(cells.roster, f"{band}.silhouette_table")
+        tables = aspect_tables_of_targets(cells.roster, f"{band}.silhouette_table")
         return area_by_table(cells, {"table": tables}, "aspect_table")
     names = (*_BODIES, "back_m2") if band == "ir" else _BODIES
     areas = {name: cells.roster.column(f"{band}.{name}") for name in names}

@@ -10,8 +10,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Roster
-from components.aircraft.known_targets import known_targets
-from components.optical.area_of_cells import check_silhouette, warn_of_other_fits
+from components.aircraft.known_targets import offered_rosters
+from components.optical.area_of_cells import area_fit_warnings, check_silhouette
 from components.optical.contrast import CONTRAST
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
@@ -26,14 +26,14 @@ from components.optical.detector import (
     CameraCalibration,
     CameraDetector,
     centroid_variance,
+    derive_detector,
     farthest_detection_m,
-    settle_detector,
 )
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
 from components.optical.weather_effects import DARKNESS, ObscuringCells, Visibility
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
-from components.sensor.look import Cells, CellValues, Look, values_of
+from components.sensor.look import Cells, CellValues, Look, effect_values_of_cells
 from components.sensor.parameters import GlintParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS, Sensor
 from dsa_des.arrays.types import FloatArray
@@ -121,7 +121,7 @@ class CameraParameters(GlintParameters, SensorParameters):
     )
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of errors, false alarms or rates that are switched off."""
+        """Return a sentence for each key without effect as noise, false alarms or rates are off."""
         said = super().ineffective_key_notes()
         if self.noise_equivalent_contrast == 0 and self.errors != "signal":
             said += self.note_ineffective("blur_pixels", because="there is no noise")
@@ -163,7 +163,7 @@ class CameraParameters(GlintParameters, SensorParameters):
 
     @property
     def states_false_alarms(self) -> bool:
-        """Return whether two other keys set the number of false alarms."""
+        """Whether two other keys, such as threshold and noise, give the number of false alarms."""
         others = self.threshold, self.noise_equivalent_contrast, self.calibrate
         if self.noise_equivalent_contrast == 0.0 or others.count(None) != 1:
             return False
@@ -213,23 +213,25 @@ class Camera(Sensor):
 
     @cached_property
     def detector(self) -> CameraDetector:
-        """Its threshold and noise, by what the scene states of them."""
-        places = max(1, round(self.all_pixels / self.spot))
-        return settle_detector(self, places, self._weight * math.sqrt(self.spot))
+        """The camera's threshold and noise, derived from those keys that the scene states."""
+        places = max(1, round(self.all_pixels / self.spot_pixels))
+        return derive_detector(
+            self, places, self._static_weight_or_one * math.sqrt(self.spot_pixels)
+        )
 
     @cached_property
-    def spot(self) -> float:
-        """Pixels over which the picture of a point is spread."""
+    def spot_pixels(self) -> float:
+        """Number of pixels over which the picture of a point is spread."""
         return noise_equivalent_pixels(self.p.blur_pixels)
 
     @property
-    def _weight(self) -> float:
+    def _static_weight_or_one(self) -> float:
         # Without a weight of its own, size says nothing: as much as if it had the unit one.
         return float(self.p.static_weight or 1.0)
 
     def setup(self) -> None:
         """Check the targets' silhouettes, and take what effects do to area, signature, contrast."""
-        for roster in known_targets(self.context) if self.areas else ():
+        for roster in offered_rosters(self.context) if self.areas else ():
             check_silhouette(roster, self.areas, self.p.silhouette)
         self._areas = self.built(AREA)
         self._contrast_factors = self.built(CONTRAST)
@@ -247,7 +249,7 @@ class Camera(Sensor):
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
     def exact_because(self) -> str:
-        """A rate divides an error's change by the scan's period; Pd has no proven bound."""
+        """Return why this camera needs an exact line of sight; an empty string if it does not."""
         if self.detector.noise and "detection_probability" in self.context.tolerance:
             return f"no bound is proven for the Pd of {self.name}"
         if not self._signatures:
@@ -283,7 +285,7 @@ class Camera(Sensor):
 
     @property
     def contrast_column(self) -> str:
-        """Column of the roster that holds the contrast it sees."""
+        """Name of the roster column with the contrast that this camera uses."""
         return self.contrasts
 
     def area(self, cells: Cells) -> FloatArray:
@@ -291,10 +293,10 @@ class Camera(Sensor):
         raise TypeError(f"{type(self).__name__} has no area(cells)")
 
     def visible_area_m2(self, cells: Cells) -> FloatArray:
-        """Return the area that shows in each cell with what the scene's effects add to it, m²."""
+        """Return the area visible in each cell, including effects such as a plume, m²."""
         area = self.area(cells)
         for added in self._areas:
-            area = area + values_of(self, added, cells)
+            area = area + effect_values_of_cells(self, added, cells)
         return area
 
     def contrast(self, cells: Cells) -> FloatArray:
@@ -302,7 +304,7 @@ class Camera(Sensor):
         raise TypeError(f"{type(self).__name__} has no contrast(cells)")
 
     def look(self, cells: Cells) -> Look:
-        """Compare every target's signature with the threshold."""
+        """Return which cells' signatures reach the threshold, with their margin above it."""
         area = self.visible_area_m2(cells)
         pixels = pixels_of_cells(
             area,
@@ -313,35 +315,35 @@ class Camera(Sensor):
         )
         contrast = self.contrast(cells)
         for factor in self._contrast_factors:
-            contrast = contrast * values_of(self, factor, cells)
+            contrast = contrast * effect_values_of_cells(self, factor, cells)
         # Eq. 18, by hand: total_signature adds the rate of the line of sight, here an effect.
         signature = self.p.static_weight * pixels * contrast
         for added in self._signatures:
-            signature = signature + values_of(self, added, cells)
-        signature = signature * self.share(pixels)
+            signature = signature + effect_values_of_cells(self, added, cells)
+        signature = signature * self.counted_signature_share(pixels)
         threshold = self._threshold_of(cells)
         noise = self.detector.noise
         if not noise:
             margin = signature - threshold
             signal = {"pixels": pixels, "contrast": contrast}
             return Look(margin >= 0.0, margin, {"pixels": pixels}, signal)
-        keys = cells.roster.keys_of(cells.target)
+        keys = cells.roster.draw_keys_of(cells.target)
         drawn = self._noise.of_runs(cells.run, cells.instant_ns).normal(keys, cells.scan)
         sample = signature + noise * drawn
         margin = sample - threshold
         seen = (margin >= 0.0) & (signature > threshold - FAINTEST_DEVIATIONS * noise)
         extras = {"pixels": pixels}
-        if self._is_asked_for_looks:
+        if self._is_every_look_recorded:
             extras["detection_probability"] = detection_probability(signature, threshold, noise)
-        return Look(seen, margin, extras, self.signal_of(sample, np.ones(len(cells))))
+        return Look(seen, margin, extras, self.signal_from_signature(sample, np.ones(len(cells))))
 
-    def share(self, pixels: FloatArray) -> FloatArray:
-        """Return how much of a signature counts: all, where a camera sees them without noise."""
+    def counted_signature_share(self, pixels: FloatArray) -> FloatArray:
+        """Return the share of the signature that counts after the filter; 1 without noise."""
         silent = self.p.noise_equivalent_contrast == 0.0
-        return np.ones_like(pixels) if silent else point_filter_share(pixels, self.spot)
+        return np.ones_like(pixels) if silent else point_filter_share(pixels, self.spot_pixels)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return what is recorded beside a detection: of a measured signature what it says."""
+        """Return a detection's recorded columns; with noise measured pixels instead of Pd."""
         extras = dict(super()._extras(cells, look))
         if self.detector.noise:
             extras["pixels"] = look.signal["pixels"]
@@ -349,7 +351,7 @@ class Camera(Sensor):
         return extras
 
     def report(self) -> dict[str, Any]:
-        """Return threshold, noise and false alarms in use."""
+        """Return threshold, noise and false alarms per frame in use, for the summary."""
         found = self.detector
         used = {
             "threshold": found.threshold,
@@ -373,13 +375,13 @@ class Camera(Sensor):
     def warnings(self) -> list[str]:
         """Return a warning for each cue without effect and each area of another silhouette."""
         said = [*super().warnings(), *cue_warnings(self)]
-        for roster in known_targets(self.context) if self.areas else ():
-            said += warn_of_other_fits(roster, self.areas, self.p.silhouette)
+        for roster in offered_rosters(self.context) if self.areas else ():
+            said += area_fit_warnings(roster, self.areas, self.p.silhouette)
         return said
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the variances of the angles to the target's centre in the picture."""
-        of_contrast = self._weight * math.sqrt(self.spot)
+        """Return the variances of the measured azimuth and elevation of a target's centre, rad²."""
+        of_contrast = self._static_weight_or_one * math.sqrt(self.spot_pixels)
         ratio = signal["contrast"] * (of_contrast / self.detector.noise)
         variance = centroid_variance(signal["pixels"], ratio, self.p.blur_pixels)
         return {
@@ -387,8 +389,8 @@ class Camera(Sensor):
             "elevation": self.pixel_elevation_rad**2 * variance,
         }
 
-    def contrasts_of(self, roster: Roster) -> FloatArray:
-        """Return the contrast gains that false alarms may be of: the targets', each once; else 1.
+    def possible_false_alarm_contrasts(self, roster: Roster) -> FloatArray:
+        """Return the distinct contrast gains of targets above 0 for false alarms, else 1.
 
         A signature that is measured with noise does not say of which contrast it is.
         """
@@ -397,9 +399,11 @@ class Camera(Sensor):
         found = np.unique(roster.column(self.contrast_column))
         return found[found > 0.0] if (found > 0.0).any() else np.ones(1)
 
-    def signal_of(self, signature: FloatArray, contrast: FloatArray) -> dict[str, FloatArray]:
-        """Return the signal of targets that have some signatures by their size alone (eq. 18)."""
-        pixels = np.maximum(signature, 0.0) / (self._weight * contrast)
+    def signal_from_signature(
+        self, signature: FloatArray, contrast: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Return the targets' pixels and contrast, if size alone made the signatures (eq. 18)."""
+        pixels = np.maximum(signature, 0.0) / (self._static_weight_or_one * contrast)
         if self.p.noise_equivalent_contrast != 0.0:
-            pixels = pixels_for_filtered_count(pixels, self.spot)
+            pixels = pixels_for_filtered_count(pixels, self.spot_pixels)
         return {"pixels": np.minimum(pixels, self.all_pixels), "contrast": contrast}

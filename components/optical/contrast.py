@@ -111,7 +111,7 @@ class Background(Effect[CellValues]):
         return Verdict(background != "none", f"background is {background!r}")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's contrast."""
+        """Return a function that gives each cell's contrast gain against its background."""
         p = block.p
         sun = {
             "sun_azimuth_rad": math.radians(p.sun_azimuth_deg),

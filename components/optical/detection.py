@@ -39,7 +39,7 @@ FAINTEST_DEVIATIONS = -_NORMAL.inv_cdf(FAINTEST_PD)
 
 
 def noise_equivalent_pixels(blur_pixels: float) -> float:
-    """Return over how many pixels the picture of a point is spread, to a filter that fits it.
+    """Return over how many pixels a blurred point is spread, as seen by its matched filter.
 
     The inverse of the sum of the squared shares of its pixels, for a Gaussian spot; King, Accuracy
     of measurement of star images on a pixel array, Publications of the Astronomical Society of the
@@ -50,7 +50,7 @@ def noise_equivalent_pixels(blur_pixels: float) -> float:
 
 
 def point_filter_share(pixels: FloatArray, spot: float) -> FloatArray:
-    """Return how much of a target's signature counts, in the noise of a point's picture.
+    """Return the share of a signature that counts if noise is that of a point's matched filter.
 
     A filter that fits a target of N pixels lets in the noise of the pixels of its blur and of its
     own, sqrt(spot + N) of a pixel's in place of sqrt(spot): its signal stands out by that much
@@ -62,7 +62,7 @@ def point_filter_share(pixels: FloatArray, spot: float) -> FloatArray:
 
 
 def pixels_for_filtered_count(filtered: FloatArray, spot: float) -> FloatArray:
-    """Return the pixels N of which N times `point_filter_share` is so much."""
+    """Return the pixel count N for which N times `point_filter_share` equals the filtered count."""
     half = filtered * filtered / (2.0 * spot)
     pixels: FloatArray = half + filtered * np.sqrt(1.0 + half / (2.0 * spot))
     return pixels
@@ -102,7 +102,8 @@ def false_alarm_direction(
     lowest_elevation_rad: float,
     highest_elevation_rad: float,
 ) -> tuple[Any, Any]:
-    """Return where in the picture false alarms appear: every pixel is as likely.
+    """Return azimuths and elevations of false alarms, uniform over the picture, from uniform
+    numbers.
 
     Evenly over azimuth and elevation, as pixels are; not over solid angle.
     """
@@ -116,8 +117,8 @@ def false_alarm_direction(
     )
     start = finite("azimuth_start_rad", azimuth_start_rad)
     shape, (across, upwards) = broadcast_flat(
-        azimuth_uniform=_unit("azimuth_uniform", azimuth_uniform),
-        elevation_uniform=_unit("elevation_uniform", elevation_uniform),
+        azimuth_uniform=_check_unit_interval("azimuth_uniform", azimuth_uniform),
+        elevation_uniform=_check_unit_interval("elevation_uniform", elevation_uniform),
     )
     azimuth = start + width * across
     elevation = lowest + (highest - lowest) * upwards
@@ -125,8 +126,8 @@ def false_alarm_direction(
 
 
 def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float) -> Any:
-    """Return the signature that false alarms have: noise, given that it reaches the threshold."""
-    draws = _unit("uniform", uniform)
+    """Return signatures of false alarms from uniform numbers: noise that reaches the threshold."""
+    draws = _check_unit_interval("uniform", uniform)
     level = max(float(finite("threshold", threshold)), 0.0)
     deviation = float(positive("noise", noise))
     tail = exceeding_probability(level / deviation)
@@ -137,7 +138,7 @@ def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float)
     return np.maximum(np.array(found), level).reshape(draws.shape)
 
 
-def _unit(name: str, value: ArrayLike) -> Any:
+def _check_unit_interval(name: str, value: ArrayLike) -> Any:
     array = finite(name, value)
     refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "be in [0, 1)")
     return array
@@ -152,7 +153,7 @@ _NO_TARGET = np.uint64(0)
 
 
 class AddedFalseAlarms:
-    """Draws the false alarms of a camera, keyed by its scans.
+    """Adds a camera's random false alarms to its reports, drawn by scan.
 
     A false alarm is reported as a target would be: on the pixel grid, with the confidence of noise
     that reaches the threshold (`false_alarm_signature`), and with the pixels that follow from its
@@ -215,10 +216,10 @@ class AddedFalseAlarms:
         signature = false_alarm_signature(
             strength, threshold=found.threshold, noise=found.alarm_noise
         )
-        contrasts = block.contrasts_of(detections.roster)
+        contrasts = block.possible_false_alarm_contrasts(detections.roster)
         which = contrast * len(contrasts)
-        signal = block.signal_of(signature, contrasts[which.astype(np.int64)])
-        azimuth, elevation, _, measured = block.report_noise(where, signal)
+        signal = block.signal_from_signature(signature, contrasts[which.astype(np.int64)])
+        azimuth, elevation, _, measured = block.report_false_alarms(where, signal)
         return add_false_detections(
             detections,
             row,
@@ -231,14 +232,16 @@ class AddedFalseAlarms:
 
 
 class FrameFalseAlarms(Effect[ReportTransform]):
-    """Noise that reaches the threshold, anywhere in the picture: Binomial(places, Pfa) a frame."""
+    """False alarms by noise anywhere in the picture, Binomial(places, Pfa) per frame."""
 
     name = "false alarms"
     acts_on = REPORT
     builds = AddedFalseAlarms
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether false alarms are simulated: by ``false_alarms``, or by their number."""
+        """Return whether false alarms are simulated: by ``false_alarms``,
+        ``false_alarms_per_frame``, or as other keys imply their number.
+        """
         p = block.p
         if not p.enabled:
             return Verdict(False, "enabled is false")

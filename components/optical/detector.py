@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.arguments.checks import check_not_negative, positive
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.optical.detection import (
@@ -28,7 +28,7 @@ _PIXEL_VARIANCE = 1.0 / 12.0
 def centroid_variance(
     pixels: FloatArray, contrast_to_noise: FloatArray, blur_pixels: float
 ) -> FloatArray:
-    """Return the variance of a target's centre along one axis of the picture.
+    """Return the variance of a target's measured centre along one picture axis, pixels².
 
     sigma² = 8 pi s⁴ / N², where N is the target's whole signal over the noise of a pixel and s²
     the variance of its picture: that of the blur, of a square of as many pixels, and of a pixel,
@@ -96,7 +96,7 @@ class CameraCalibration(Parameters):
 
 @dataclass(frozen=True)
 class CameraDetector:
-    """What a camera detects with."""
+    """Threshold and noise with which a camera detects."""
 
     threshold: float  # Sample of a signature that is a detection
     # Standard deviation of the samples; 0 for a camera that sees signatures as they are
@@ -106,8 +106,8 @@ class CameraDetector:
     false_alarms: float  # Expected in a frame
 
 
-def settle_detector(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
-    """Return a camera's detector: what the scene leaves open follows from what it states.
+def derive_detector(camera: Any, places: int, noise_of_contrast: float) -> CameraDetector:
+    """Return threshold, noise and false alarm rate, deriving those that the scene omits.
 
     Any two of threshold, noise, false alarms and a known range give the others.
     """
@@ -185,7 +185,9 @@ def threshold_deviations(false_alarms: float, places: int) -> float:
 
 
 class _OneLook:
-    """One cell: an aircraft at a known range, aspect and contrast, level and at our altitude."""
+    """Stand-in for the cells of one look: a level aircraft at a known range, aspect and contrast at
+    the ownship's altitude.
+    """
 
     def __init__(self, craft: Aircraft, range_m: float, aspect_rad: float) -> None:
         self.roster = Roster.from_pairs([("calibrate", craft)])
@@ -202,7 +204,7 @@ class _OneLook:
 
 
 def calibrated_signature(camera: Any, known: CameraCalibration) -> float:
-    """Return the signature of the target whose probability of detection is known."""
+    """Return the signature that the target of the calibration has at its range."""
     craft = known.aircraft
     if craft is None:  # a sphere shows the same to all sides
         area_m2 = known.area_m2 or 0.0
@@ -226,14 +228,16 @@ def calibrated_signature(camera: Any, known: CameraCalibration) -> float:
                 "that band's air is another; give the contrast that is left (calibrate.contrast)"
             )
         contrast = contrast * visibility_transmission(range_m, 1000.0 * known.visibility_km)
-    signature = float((camera.p.static_weight * pixels * contrast * camera.share(pixels))[0])
+    signature = float(
+        (camera.p.static_weight * pixels * contrast * camera.counted_signature_share(pixels))[0]
+    )
     if signature <= 0.0:
         raise ValueError("calibrate: the target has no signature there, so no Pd but that of noise")
     return signature
 
 
 def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
-    """Return a range that no detection of this camera exceeds, m.
+    """Return a range beyond which this camera detects nothing, m; infinite if unknown.
 
     The area shown is at most the sum of the bodies' areas and the contrast at most each target's
     own, so a target needs as many pixels at least as give the faintest signature that is ever
@@ -242,7 +246,7 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
     with a rate of the line of sight in the signature, with areas from a table, with effects that
     can add to area or contrast, or with targets that the camera was not told of.
     """
-    rosters = known_targets(camera.context)
+    rosters = offered_rosters(camera.context)
     adding = [
         effect.name
         for effect in type(camera).effects
@@ -274,6 +278,6 @@ def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
     seen = (gain > 0.0) & (area > 0.0) & (camera.p.static_weight > 0.0)
     if not seen.any():
         return _MARGIN_M
-    fewest = camera.signal_of(faintest, gain[seen])["pixels"]
+    fewest = camera.signal_from_signature(faintest, gain[seen])["pixels"]
     pixel = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
     return math.sqrt(float(np.max(area[seen] / fewest)) / pixel) * _MARGIN + _MARGIN_M

@@ -33,7 +33,7 @@ _AROUND = np.ones((3, 3), np.uint8)
 
 @cache
 def opencv() -> Any:
-    """Return OpenCV on one thread, or say how it is had."""
+    """Return OpenCV set to one thread; raise ImportError with the command to install it."""
     try:
         import cv2
     except ImportError as error:
@@ -66,7 +66,7 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     has no peak but noise, the middle of what stands out with it.
     """
     cv2 = opencv()
-    rim = _rim(picture.shape[0])
+    rim = _rim_mask(picture.shape[0])
     behind = float(picture[rim].mean())
     flat = picture - behind
     best: tuple[float, Any, float] = (-math.inf, flat, 1.0)
@@ -89,22 +89,21 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     row, column = np.unravel_index(
         int(np.argmax(np.where(sought, through, -math.inf))), picture.shape
     )
-    x = float(column + 0.5 + _vertex(through[row, max(column - 1, 0) : column + 2]))
-    y = float(row + 0.5 + _vertex(through[max(row - 1, 0) : row + 2, column]))
+    x = float(column + 0.5 + _parabola_vertex_offset(through[row, max(column - 1, 0) : column + 2]))
+    y = float(row + 0.5 + _parabola_vertex_offset(through[max(row - 1, 0) : row + 2, column]))
     finest = cv2.GaussianBlur(flat, (0, 0), spread_pixels, borderType=cv2.BORDER_REFLECT)
     level = float(finest[row, column])
     stands = sought & (finest > 0.5 * level)
     pixels = int(np.count_nonzero(stands)) if level > 0.0 else 0
     if pixels > 4.0 * math.pi * of_best**2:
-        x, y = _middle(stands, finest, int(row), int(column), (x, y))
+        x, y = _spot_centroid(stands, finest, int(row), int(column), (x, y))
     return Spot(snr, x, y, pixels, level, behind, cluttered)
 
 
-def _middle(
+def _spot_centroid(
     stands: BoolArray, picture: FloatArray, row: int, column: int, otherwise: tuple[float, float]
 ) -> tuple[float, float]:
-    """Return the centroid (x, y) of the bright spot around a pixel, moved if that lies off the
-    pixel.
+    """Return the bright region's centroid (x, y), or `otherwise` if that lies outside it.
 
     It is weighed by the picture, as its edge covers pixels in part.
     """
@@ -117,7 +116,7 @@ def _middle(
 
 @cache
 def _filter_noise_gain(size: int, spread: float) -> float:
-    """Return the deviation that a filter, less the rim's mean, makes of white noise of deviation 1.
+    """Return unit white noise's deviation after a Gaussian filter, with the rim's mean removed.
 
     Of the filter as it is in pixels: by the formula for a continuous picture noise comes out as 1.1
     to 1.5 times what is expected, and a false alarm at 3 deviations is 14 times as likely.
@@ -125,19 +124,19 @@ def _filter_noise_gain(size: int, spread: float) -> float:
     point = np.zeros((size, size))
     point[size // 2, size // 2] = 1.0
     weight = opencv().GaussianBlur(point, (0, 0), spread, borderType=opencv().BORDER_REFLECT)
-    rim = _rim(size)
+    rim = _rim_mask(size)
     weight -= rim / np.count_nonzero(rim)
     return float(np.sqrt((weight**2).sum()))
 
 
 @cache
-def _rim(size: int) -> BoolArray:
+def _rim_mask(size: int) -> BoolArray:
     rim = np.ones((size, size), dtype=bool)
     rim[_RING:-_RING, _RING:-_RING] = False
     return rim
 
 
-def _vertex(three: FloatArray) -> float:
+def _parabola_vertex_offset(three: FloatArray) -> float:
     if len(three) < 3:
         return 0.0
     before, here, after = (float(v) for v in three)
@@ -146,7 +145,7 @@ def _vertex(three: FloatArray) -> float:
 
 
 class Flow(NamedTuple):
-    """Displacement of a spot between two pictures, pixels; NaN where it is not measured."""
+    """A spot's displacement between two pictures and its deviation, pixels; NaN if unmeasured."""
 
     x: float
     y: float
@@ -161,7 +160,8 @@ _NOTHING = Flow(math.nan, math.nan, math.nan)
 def spot_flow(
     earlier: FloatArray, later: FloatArray, spot: Spot, sought: BoolArray, noise: float
 ) -> Flow:
-    """Return how far the spot of the later picture has come since the earlier one.
+    """Return the displacement (x, y) of a spot from the earlier picture to the later one, and its
+    standard deviation, pixels.
 
     Of both pictures the share of each pixel that the target covers is worked out, from its level
     and from the background, as it is beside the target; so the flow is the target's, whatever the
@@ -174,7 +174,7 @@ def spot_flow(
     """
     if spot.pixels < FEWEST_PIXELS or spot.level <= 0.0:
         return _NOTHING
-    mask = _mask(later, spot, sought)
+    mask = _spot_mask(later, spot, sought)
     if mask is None:
         return _NOTHING
     ahead = _match_whole_pixels(earlier, later, spot, mask)
@@ -204,8 +204,8 @@ def spot_flow(
     return Flow(float(flow[0]), float(flow[1]), deviation)
 
 
-def _mask(later: FloatArray, spot: Spot, sought: BoolArray) -> Any:
-    """Return which pixels are the spot's and beside it, 0 or 1; None where it is no one."""
+def _spot_mask(later: FloatArray, spot: Spot, sought: BoolArray) -> Any:
+    """Return a mask (0 or 1) of the spot's pixels and those beside them; None if not found."""
     cv2, size = opencv(), later.shape[0]
     stands = (sought & (later - spot.behind > 0.5 * spot.level)).astype(np.uint8)
     _, labels = cv2.connectedComponents(stands, connectivity=8)
@@ -216,7 +216,7 @@ def _mask(later: FloatArray, spot: Spot, sought: BoolArray) -> Any:
 def _match_whole_pixels(
     earlier: FloatArray, later: FloatArray, spot: Spot, mask: AnyArray
 ) -> AnyArray:
-    """Return how far the spot's pixels came, where they correlate best."""
+    """Return the spot's displacement (x, y) in whole pixels, by the pictures' best correlation."""
     cv2 = opencv()
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
@@ -238,7 +238,7 @@ def _shift_pixels(picture: AnyArray, by: AnyArray) -> AnyArray:
 
 
 def _pixel_coverage(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArray:
-    """Return the share of each pixel that the target covers; 0 beyond what is its own.
+    """Return the share of each pixel that the target covers, 0 beyond its own pixels.
 
     A pixel is partly the target's and partly the background's: the background counts less the more
     is covered.
@@ -254,7 +254,7 @@ def _pixel_coverage(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArr
 
 
 def _interpolate_background(picture: FloatArray, own: AnyArray, level: float) -> FloatArray:
-    """Return the background, carried on behind the target as smoothly as what is beside it lets."""
+    """Return the background, with the target's pixels filled smoothly from those beside them."""
     cv2 = opencv()
     outside = 1.0 - own.astype(np.float64)
     weight = cv2.GaussianBlur(outside, (0, 0), _NEAR) + _LITTLE
@@ -267,12 +267,12 @@ def _interpolate_background(picture: FloatArray, own: AnyArray, level: float) ->
 
 
 def _register_shift(first: FloatArray, second: FloatArray, noise: float) -> Flow:
-    """Return by how much less than a pixel or so the second picture is shifted against the first.
+    """Return the second picture's sub-pixel shift and its standard deviation, pixels.
 
     The correlation is that of both, smoothed by `_SMOOTH`: the sharpest detail is not sampled
     finely enough to say where it is.
     """
-    k, square, soft, counted = _waves(len(first))
+    k, square, soft, counted = _wave_numbers_and_weights(len(first))
     one, other = np.fft.rfft2(first), np.fft.rfft2(second)
     both = other * np.conj(one) * (soft * counted)
     shift = np.zeros(2)
@@ -298,11 +298,11 @@ def _register_shift(first: FloatArray, second: FloatArray, noise: float) -> Flow
         return _NOTHING
     inverse = np.linalg.inv(bend)
     covariance = power * inverse @ _moment_matrix(square, soft * turned.real) @ inverse
-    return Flow(float(shift[0]), float(shift[1]), math.sqrt(_largest(covariance)))
+    return Flow(float(shift[0]), float(shift[1]), math.sqrt(_largest_axis_variance(covariance)))
 
 
-def _largest(covariance: FloatArray) -> float:
-    """Return the variance along the axis on which it is largest, (2, 2)."""
+def _largest_axis_variance(covariance: FloatArray) -> float:
+    """Return the largest eigenvalue of a covariance matrix (2, 2)."""
     (xx, xy), (_, yy) = covariance
     return float(0.5 * (xx + yy) + math.hypot(0.5 * (xx - yy), xy))
 
@@ -313,8 +313,10 @@ def _moment_matrix(square: Any, values: FloatArray) -> FloatArray:
 
 
 @cache
-def _waves(size: int) -> tuple[Any, Any, FloatArray, FloatArray]:
-    """Return waves' numbers per pixel, their products, how much they count, and how often."""
+def _wave_numbers_and_weights(size: int) -> tuple[Any, Any, FloatArray, FloatArray]:
+    """Return wave numbers (x, y) in rad per pixel, their products, the smoothing weights, and how
+    often each wave counts.
+    """
     x = 2.0 * np.pi * np.fft.rfftfreq(size)[np.newaxis]
     y = 2.0 * np.pi * np.fft.fftfreq(size)[:, np.newaxis]
     soft = np.exp(-0.5 * _SMOOTH**2 * (x * x + y * y)) * (x < np.pi) * (np.abs(y) < np.pi)

@@ -14,16 +14,16 @@ from components.messages.detections import EXTRAS, Detections
 from components.optical.flow import find_spot, opencv, spot_flow
 from components.optical.picture import (
     Pinhole,
-    background,
     grey_levels,
     patch_angles,
     target_outlines,
+    textured_background,
     union_coverage,
 )
 from components.optical.sensors import ElectroOptical, ElectroOpticalParameters
 from components.optical.silhouette import union_area
-from components.sensor.ladder_values import measure_cells
-from components.sensor.look import Cells, Look, values_of
+from components.sensor.ladder_values import make_cell_measure
+from components.sensor.look import Cells, Look, effect_values_of_cells
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.message import Column, columns
@@ -49,7 +49,7 @@ class PictureDetections(Detections):
 
 
 class ImageParameters(ElectroOpticalParameters):
-    """Parameters of a camera that sees pictures."""
+    """Parameters of a camera that renders pictures and searches them for targets."""
 
     silhouette: Literal[
         "exact", "thesis", "convex_hull", "aspect_table", "sampled_table", "mesh"
@@ -86,7 +86,7 @@ class ImageParameters(ElectroOpticalParameters):
         return self
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of a texture that is switched off."""
+        """Return a sentence for each key without effect as the background's texture is off."""
         said = super().ineffective_key_notes()
         if not self.texture_contrast:
             said += self.note_ineffective("texture_pixels", because="texture_contrast is 0")
@@ -103,7 +103,7 @@ _KEPT, SHOWN = 1024, 48
 
 
 class _View(NamedTuple):
-    """What a camera's frames are drawn from, of all cells at one instant."""
+    """Pixel positions of all cells' targets at one instant, and the ownship's attitude then."""
 
     column: FloatArray  # of the target's middle
     row: FloatArray
@@ -126,7 +126,8 @@ _LADDER = Ladder(
              {"silhouette": "convex_hull"}),
         Rung("image", "rendered, searched, its flow measured", "optical.image"),
     ),
-    "image", (Quantity("confidence", "signature"),), measure_cells(_confidence), clears=("model",),
+    "image", (Quantity("confidence", "signature"),), make_cell_measure(_confidence),
+    clears=("model",),
 )  # fmt: skip
 
 
@@ -160,11 +161,11 @@ class ImageCamera(ElectroOptical):
         self.patches: dict[tuple[int, int], AnyArray] = {}
 
     def request(self, port: str) -> Any:
-        """Return a request for targets with flights: the earlier frame has its own instant."""
+        """Return a request for targets at the instants of both frames."""
         return replace(super().request(port), lasts_s=self.p.frame_interval_s)
 
     def look(self, cells: Cells) -> Look:
-        """Render every target twice, and look for it."""
+        """Render two frames of every cell in the picture, search them, and return detections."""
         count = len(cells)
         fields = {name: np.full(count, np.nan) for name in PICTURE}
         confidence, pixels = np.full(count, -self.detector.threshold), np.zeros(count)
@@ -173,10 +174,10 @@ class ImageCamera(ElectroOptical):
             outlines = self._outlines(cells, now)
             contrast = self.contrast(cells)
             for factor in self._contrast_factors:
-                contrast = contrast * values_of(self, factor, cells)
+                contrast = contrast * effect_values_of_cells(self, factor, cells)
             fields["true_column_px"], fields["true_row_px"] = now.column, now.row
-            keys = cells.roster.keys_of(cells.target)
-            in_frame = self.pinhole.holds(now.column, now.row)
+            keys = cells.roster.draw_keys_of(cells.target)
+            in_frame = self.pinhole.is_in_frame(now.column, now.row)
             for cell in np.flatnonzero(in_frame).tolist():
                 seen = self._measure_cell(
                     cells, cell, now, before, bool(there[cell]), [o[cell] for o in outlines],
@@ -189,7 +190,7 @@ class ImageCamera(ElectroOptical):
         return Look(confidence >= 0.0, confidence, {"pixels": pixels, **fields}, {})
 
     def _views(self, cells: Cells) -> tuple[_View, _View, Any]:
-        """Return the frames' views of all cells, now and earlier, and who was there then."""
+        """Return the cells' pixels now and one frame ago, and which targets were present (mask)."""
         now = self._view(cells.body_azimuth_rad, cells.body_elevation_rad, cells.own_attitude)
         count = len(cells)
         seen = cells.seen_at(np.arange(count), np.full(count, -self.p.frame_interval_s))
@@ -201,7 +202,7 @@ class ImageCamera(ElectroOptical):
         return _View(*self.pinhole.pixel(*self.axes(azimuth, elevation)), attitude)
 
     def _outlines(self, cells: Cells, now: _View) -> list[FloatArray]:
-        """Return outlines (cells, points, 2) in pixels about each target's middle."""
+        """Return capsule and plate outlines, (cells, points, 2) each, pixels from the middle."""
         columns = (cells.roster.column(f"eo.{n}_m2") for n in ("front", "side", "horizontal"))
         front, side, flat = (cells.of_target(column) for column in columns)
         yaw = cells.relative_heading_rad + cells.azimuth_rad
@@ -236,7 +237,7 @@ class ImageCamera(ElectroOptical):
         contrast: float,
         key: Any,
     ) -> dict[str, float]:
-        """Return the measurement from the two frames of a cell."""
+        """Return the measurement from the two frames of one cell, by column name."""
         middle = np.array([now.column[cell], now.row[cell]])
         points = np.concatenate(outlines)
         extent = float(np.nanmax(np.abs(points), initial=0.0))
@@ -257,13 +258,13 @@ class ImageCamera(ElectroOptical):
         half = max(16, math.ceil(extent / binned) + margin)
         corner = np.floor(middle / binned).astype(np.int64) - half
         scene = _Scene(cells, cell, key, half, binned, contrast, outlines, smear / binned)
-        later = self._frame(scene, corner, middle, attitude, _CURRENT)
+        later = self._render_patch(scene, corner, middle, attitude, _CURRENT)
         pixels_y, pixels_x = np.mgrid[: 2 * half, : 2 * half] + 0.5
         at = middle / binned - corner
         sought = np.hypot(pixels_x - at[0], pixels_y - at[1]) <= max(2.0, extent / binned + 1.0)
         spread = math.sqrt((self.p.blur_pixels / binned) ** 2 + 1.0 / 12.0)
         spot = find_spot(later, sought, spread, self.pixel_noise / binned)
-        self._keep(cells, cell, later)
+        self._keep_patch_picture(cells, cell, later)
         place = (np.array([spot.x, spot.y]) + corner) * binned
         answer = {
             "confidence": spot.snr * self.detector.noise - self.detector.threshold,
@@ -277,7 +278,7 @@ class ImageCamera(ElectroOptical):
         if not np.isfinite(where).all():
             return answer
         before_corner = np.floor(where / binned).astype(np.int64) - half
-        first = self._frame(scene, before_corner, earlier, then, _EARLIER)
+        first = self._render_patch(scene, before_corner, earlier, then, _EARLIER)
         flow = spot_flow(first, later, spot, sought, self.pixel_noise / binned)
         moved_px = (np.array(flow[:2]) + corner - before_corner) * binned
         answer["flow_deviation_px"] = flow.deviation * binned
@@ -291,12 +292,14 @@ class ImageCamera(ElectroOptical):
     @property
     def pixel_noise(self) -> float:
         """Standard deviation of a pixel's noise, as a contrast."""
-        return float(self.detector.noise / (self._weight * math.sqrt(self.spot)))
+        return float(
+            self.detector.noise / (self._static_weight_or_one * math.sqrt(self.spot_pixels))
+        )
 
-    def _frame(
+    def _render_patch(
         self, scene: "_Scene", corner: IntArray, middle: FloatArray, attitude: Any, which: int
     ) -> FloatArray:
-        """Return a patch of a frame; its corner counts binned pixels.
+        """Return a square patch of a frame, contrast with noise; `corner` is in binned pixels.
 
         The optics blur before anything falls on pixels: it is drawn twice as fine, and summed up.
         """
@@ -311,7 +314,7 @@ class ImageCamera(ElectroOptical):
         covered = fine.reshape(side, 2, side, 2).mean(axis=(1, 3))
         picture = scene.contrast * covered
         if self.p.texture_contrast:
-            behind = self.p.texture_contrast * self._background(scene, corner, attitude)
+            behind = self.p.texture_contrast * self._patch_texture(scene, corner, attitude)
             picture = picture + (1.0 - covered) * behind
         number = np.arange(side * side, dtype=np.uint64) * _APART
         scans = np.full(side * side, scene.cells.scan[scene.cell])
@@ -321,7 +324,7 @@ class ImageCamera(ElectroOptical):
         noise = drawn.reshape(side, side)
         return np.asarray(picture + (self.pixel_noise / scene.binned) * noise)
 
-    def _background(self, scene: "_Scene", corner: IntArray, attitude: Any) -> FloatArray:
+    def _patch_texture(self, scene: "_Scene", corner: IntArray, attitude: Any) -> FloatArray:
         """Return the texture under a patch, as directions over it are linear in its pixels."""
         side = 2 * scene.half
         at = (corner + scene.half) * scene.binned
@@ -338,7 +341,7 @@ class ImageCamera(ElectroOptical):
             return draws.normal(one.astype(np.uint64), other)
 
         grain = self.p.texture_pixels * self.pixel_azimuth_rad
-        return background(normal, azimuth, elevation, grain)
+        return textured_background(normal, azimuth, elevation, grain)
 
     def _pixel_to_ned(self, pixel: AnyArray, attitude: Any) -> FloatArray:
         x, y, z = self._direction(pixel, attitude)
@@ -346,7 +349,7 @@ class ImageCamera(ElectroOptical):
 
     def _direction(self, pixel: AnyArray, attitude: Any) -> FloatArray:
         """Return the direction in NED of a place in the frame."""
-        seen = self.axes.true_direction(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
+        seen = self.axes.true_direction_in_body(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
         return np.array(body_to_ned(*unit_vector(*seen), *attitude))[:, 0]
 
     def _pixel_of(self, direction: FloatArray, attitude: Any) -> FloatArray:
@@ -354,8 +357,8 @@ class ImageCamera(ElectroOptical):
         body = ned_to_body(*(np.atleast_1d(one) for one in direction), *attitude)
         return np.array(self.pinhole.pixel(*self.axes(*angles_of(*body))))[:, 0]
 
-    def _keep(self, cells: Cells, cell: int, picture: FloatArray) -> None:
-        """Keep the middle of a patch to be shown."""
+    def _keep_patch_picture(self, cells: Cells, cell: int, picture: FloatArray) -> None:
+        """Store a patch as grey levels for display; the oldest ones are removed."""
         tick = int(cells.scan_ticks[cells.row[cell]])
         self.patches[int(cells.target[cell]), tick] = grey_levels(picture, SHOWN)
         while len(self.patches) > _KEPT:
@@ -365,16 +368,16 @@ class ImageCamera(ElectroOptical):
         self, cells: Cells, detected: IntArray, look: Look, azimuth_rad: FloatArray,
         elevation_rad: FloatArray, range_m: FloatArray,
     ) -> Any:  # fmt: skip
-        """Report the spot's place in the picture, with what errors the scene adds to it."""
+        """Return the measurement with the spot's direction, not the true one, and errors added."""
         column, row = (look.extras[name][detected] for name in ("column_px", "row_px"))
-        seen = self.axes.true_direction(*self.pinhole.direction(column, row))
+        seen = self.axes.true_direction_in_body(*self.pinhole.direction(column, row))
         known = np.isfinite(column)
         azimuth_rad = np.where(known, seen[0], azimuth_rad)
         elevation_rad = np.where(known, seen[1], elevation_rad)
         return super()._measure(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return the recorded picture columns of each cell."""
+        """Return the picture columns recorded with each detection."""
         cued = {"cued": cells.is_cued()} if self._cue_cones else {}
         return {**look.extras, **cued}
 

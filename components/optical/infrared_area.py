@@ -7,8 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.aircraft.known_targets import known_targets
-from components.arguments.checks import angle, broadcast_flat, check_not_negative, unflatten
+from components.aircraft.known_targets import offered_rosters
+from components.arguments.checks import (
+    broadcast_flat,
+    check_angle_rad,
+    check_not_negative,
+    unflatten,
+)
 from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
 from components.sensor.look import Cells, CellValues, aspect_angles_of_cells
 from dsa_des.arrays.types import FloatArray
@@ -30,7 +35,7 @@ def plume_area(
     engine: str,
     plume_share_of_back: ArrayLike | None = None,
 ) -> Any:
-    """Return the extra area of the hot exhaust plume, growing from nose to tail aspect.
+    """Return the hot exhaust plume's additional area, m², growing from nose to tail aspect.
 
     share · back · (1 + cos g)/2, with g the angle between the target's nose and the line of sight
     from us to it: 0 head-on, where the airframe hides the plume, half abeam, all of it from
@@ -43,10 +48,10 @@ def plume_area(
         )
     share = PLUME_SHARE_OF_BACK[engine] if plume_share_of_back is None else plume_share_of_back
     shape, (heading, pitch, roll, elevation, back, shares) = broadcast_flat(
-        relative_heading_rad=angle("relative_heading_rad", relative_heading_rad),
-        pitch_rad=angle("pitch_rad", pitch_rad),
-        roll_rad=angle("roll_rad", roll_rad),
-        elevation_rad=angle("elevation_rad", elevation_rad),
+        relative_heading_rad=check_angle_rad("relative_heading_rad", relative_heading_rad),
+        pitch_rad=check_angle_rad("pitch_rad", pitch_rad),
+        roll_rad=check_angle_rad("roll_rad", roll_rad),
+        elevation_rad=check_angle_rad("elevation_rad", elevation_rad),
         back_m2=check_not_negative("back_m2", back_m2),
         plume_share_of_back=check_not_negative("plume_share_of_back", share),
     )
@@ -115,7 +120,7 @@ class Plume(Effect[CellValues]):
         """Return whether plumes radiate: needs ``plume``, and a target whose engine has one."""
         if not block.p.plume:
             return Verdict(False, "plume is false")
-        rosters = known_targets(block.context)
+        rosters = offered_rosters(block.context)
         if not rosters:
             return Verdict(True, "plume is true and the targets are not known before the run")
         for roster in rosters:
@@ -125,7 +130,7 @@ class Plume(Effect[CellValues]):
         return Verdict(False, "plume is true, but no target's engine has one")
 
     def build(self, block: Any) -> CellValues:
-        """Return the plume's area to add to every cell's."""
+        """Return a function that gives the plume's area to add in each cell, m²."""
         scale = 1.0 if block.p.plume else 0.0
         shares = {engine: scale * share for engine, share in PLUME_SHARE_OF_BACK.items()}
 

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    angle,
     broadcast_flat,
+    check_angle_rad,
     check_not_negative,
     finite,
     positive,
@@ -30,7 +30,7 @@ _SMALLEST_SINE = 1e-3
 
 @dataclass(frozen=True)
 class Sky:
-    """Hold one sky condition: how much light it passes, and how it spreads it."""
+    """Light transmission and luminance distribution of one sky condition."""
 
     # c of exp(-c · air mass) for the sun's beam; None when clouds hide the sun
     beam_extinction: float | None
@@ -54,29 +54,29 @@ SKIES = {
 
 
 def find_sky(name: str) -> Sky:
-    """Return the sky condition of a name."""
+    """Return the sky condition of the given name; raise ValueError for an unknown one."""
     if name not in SKIES:
         raise ValueError(f"sky is {name!r}: it must be one of {', '.join(SKIES)}")
     return SKIES[name]
 
 
-def daylight_sun(sun_elevation_rad: ArrayLike) -> FloatArray:
-    """Check that the sun is up: the models here are for daylight."""
-    sun = angle("sun_elevation_rad", sun_elevation_rad)
+def check_daylight_sun(sun_elevation_rad: ArrayLike) -> FloatArray:
+    """Return the sun's elevation; raise ValueError if the sun is not above the horizon."""
+    sun = check_angle_rad("sun_elevation_rad", sun_elevation_rad)
     up = (sun > 0.0) & (sun <= 0.5 * np.pi + 1e-12)
     refuse("sun_elevation_rad", sun, ~up, "be above 0 and at most pi/2 (daylight models)")
     return sun
 
 
 def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
-    """Return the illuminance of the sun's beam on a surface across it.
+    """Return the illuminance of the direct sun on a surface perpendicular to it, lux.
 
     127,500 lux · exp(-c / sin(elevation)); 0 under an overcast sky.
 
     IES RP-21 (1984), sea level.
     """
     extinction = find_sky(sky).beam_extinction
-    shape, (sun,) = broadcast_flat(sun_elevation_rad=daylight_sun(sun_elevation_rad))
+    shape, (sun,) = broadcast_flat(sun_elevation_rad=check_daylight_sun(sun_elevation_rad))
     if extinction is None:
         return unflatten(np.zeros_like(sun), shape)
     air_mass = 1.0 / np.maximum(np.sin(sun), _SMALLEST_SINE)
@@ -84,12 +84,12 @@ def beam_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
 
 
 def sky_illuminance(sun_elevation_rad: ArrayLike, sky: str = "clear") -> Any:
-    """Return the illuminance of the whole sky on the level ground, without the sun's beam.
+    """Return the illuminance of level ground by the sky without the direct sun, lux.
 
     IES RP-21 (1984): A + B sin(elevation)^C.
     """
     base, rise, exponent = find_sky(sky).diffuse_lux
-    shape, (sun,) = broadcast_flat(sun_elevation_rad=daylight_sun(sun_elevation_rad))
+    shape, (sun,) = broadcast_flat(sun_elevation_rad=check_daylight_sun(sun_elevation_rad))
     sine = np.sin(sun)
     shaped = np.sqrt(sine) if exponent == 0.5 else sine
     return unflatten(base + rise * shaped, shape)
@@ -102,7 +102,7 @@ def sky_luminance(
     sun_elevation_rad: ArrayLike,
     sky: str = "clear",
 ) -> Any:
-    """Return the luminance of the sky in a direction, brighter round the sun and at the horizon.
+    """Return the luminance of the sky in a direction, cd/m².
 
     The CIE standard general sky, scaled so that the whole sky gives `sky_illuminance`. The sun's
     disc itself is not part of it. Directions below the horizon get the horizon's luminance.
@@ -112,10 +112,10 @@ def sky_luminance(
     """
     find_sky(sky)
     shape, (azimuth, elevation, sun_azimuth, sun_elevation) = broadcast_flat(
-        azimuth_rad=angle("azimuth_rad", azimuth_rad),
-        elevation_rad=angle("elevation_rad", elevation_rad),
-        sun_azimuth_rad=angle("sun_azimuth_rad", sun_azimuth_rad),
-        sun_elevation_rad=daylight_sun(sun_elevation_rad),
+        azimuth_rad=check_angle_rad("azimuth_rad", azimuth_rad),
+        elevation_rad=check_angle_rad("elevation_rad", elevation_rad),
+        sun_azimuth_rad=check_angle_rad("sun_azimuth_rad", sun_azimuth_rad),
+        sun_elevation_rad=check_daylight_sun(sun_elevation_rad),
     )
     from_sun = angle_between(azimuth, elevation, sun_azimuth, sun_elevation)
     pattern = _pattern(np.sin(elevation), from_sun, sky)
@@ -128,7 +128,7 @@ def sky_luminance(
 
 
 def _pattern(sin_elevation: FloatArray, from_sun_rad: FloatArray, sky: str) -> FloatArray:
-    """Return the unscaled CIE luminance: gradation times indicatrix."""
+    """Return the relative luminance of the sky by the CIE formula, gradation times indicatrix."""
     a, b = SKIES[sky].gradation
     c, d, e = SKIES[sky].indicatrix
     gradation = 1.0 + a * np.exp(b / np.maximum(sin_elevation, _SMALLEST_SINE))
@@ -142,7 +142,9 @@ def _pattern(sin_elevation: FloatArray, from_sun_rad: FloatArray, sky: str) -> F
 
 @lru_cache(maxsize=len(SKIES))
 def _pattern_illuminance(sky: str) -> FloatArray:
-    """Integrate the pattern's horizontal illuminance for the sun at 0, 1, ... 90 degrees."""
+    """Return the unscaled sky's horizontal illuminance for the sun at 0, 1, ... 90 deg, (91,). 90
+    degrees.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(48)
     elevation = 0.25 * np.pi * (nodes + 1.0)
     turn = 0.5 * np.pi * (nodes + 1.0)
@@ -178,7 +180,7 @@ def target_luminance(
     ground_reflectance: ArrayLike = 0.2,
     sky: str = "clear",
 ) -> Any:
-    """Return the mean luminance of a matt painted target, by its aspect to the sun.
+    """Return the mean luminance of a matt painted target seen in a direction under a sun, cd/m².
 
     The target is taken as a Lambert sphere: its sunlit side is turned to us when the sun is behind
     us, its shaded side when we look towards the sun. With χ the angle between the line of sight
@@ -194,12 +196,12 @@ def target_luminance(
     paint = finite("paint_reflectance", paint_reflectance)
     refuse("paint_reflectance", paint, ~((paint >= 0.0) & (paint <= 1.0)), "be between 0 and 1")
     shape, (azimuth, elevation, sun_azimuth, sun_elevation, rho, ground) = broadcast_flat(
-        azimuth_rad=angle("azimuth_rad", azimuth_rad),
-        elevation_rad=angle("elevation_rad", elevation_rad),
-        sun_azimuth_rad=angle("sun_azimuth_rad", sun_azimuth_rad),
-        sun_elevation_rad=daylight_sun(sun_elevation_rad),
+        azimuth_rad=check_angle_rad("azimuth_rad", azimuth_rad),
+        elevation_rad=check_angle_rad("elevation_rad", elevation_rad),
+        sun_azimuth_rad=check_angle_rad("sun_azimuth_rad", sun_azimuth_rad),
+        sun_elevation_rad=check_daylight_sun(sun_elevation_rad),
         paint_reflectance=paint,
-        ground_reflectance=_ground(ground_reflectance),
+        ground_reflectance=_check_ground_reflectance(ground_reflectance),
     )
     from_sun = angle_between(azimuth, elevation, sun_azimuth, sun_elevation)
     lit = np.maximum(np.sin(from_sun) - from_sun * np.cos(from_sun), 0.0) / np.pi
@@ -219,17 +221,17 @@ def background_luminance(
     sky: str = "clear",
     background: str = "auto",
 ) -> Any:
-    """Return the luminance of what lies behind the target, the sky or matt ground."""
+    """Return the luminance of the background behind the target, sky or matt ground, cd/m²."""
     if background not in BACKGROUNDS:
         raise ValueError(
             f"background is {background!r}: it must be one of {', '.join(BACKGROUNDS)}"
         )
     shape, (azimuth, elevation, sun_azimuth, sun_elevation, ground) = broadcast_flat(
-        azimuth_rad=angle("azimuth_rad", azimuth_rad),
-        elevation_rad=angle("elevation_rad", elevation_rad),
-        sun_azimuth_rad=angle("sun_azimuth_rad", sun_azimuth_rad),
-        sun_elevation_rad=daylight_sun(sun_elevation_rad),
-        ground_reflectance=_ground(ground_reflectance),
+        azimuth_rad=check_angle_rad("azimuth_rad", azimuth_rad),
+        elevation_rad=check_angle_rad("elevation_rad", elevation_rad),
+        sun_azimuth_rad=check_angle_rad("sun_azimuth_rad", sun_azimuth_rad),
+        sun_elevation_rad=check_daylight_sun(sun_elevation_rad),
+        ground_reflectance=_check_ground_reflectance(ground_reflectance),
     )
     above = sky_luminance(azimuth, elevation, sun_azimuth, sun_elevation, sky)
     below = _ground_luminance(sun_elevation, ground, sky)
@@ -238,7 +240,7 @@ def background_luminance(
     return unflatten(above if background == "sky" else below, shape)
 
 
-def _ground(ground_reflectance: ArrayLike) -> FloatArray:
+def _check_ground_reflectance(ground_reflectance: ArrayLike) -> FloatArray:
     ground = finite("ground_reflectance", ground_reflectance)
     allowed = (ground > 0.0) & (ground <= 1.0)
     refuse("ground_reflectance", ground, ~allowed, "be above 0 and at most 1")
@@ -246,6 +248,6 @@ def _ground(ground_reflectance: ArrayLike) -> FloatArray:
 
 
 def _ground_luminance(sun_elevation_rad: FloatArray, reflectance: FloatArray, sky: str) -> Any:
-    """Return the luminance of level Lambert ground under sun and sky."""
+    """Return the luminance of level matt ground under sun and sky, cd/m²."""
     beam = beam_illuminance(sun_elevation_rad, sky) * np.sin(sun_elevation_rad)
     return reflectance * (beam + sky_illuminance(sun_elevation_rad, sky)) / np.pi

@@ -55,14 +55,14 @@ class Pinhole:
             )
 
     @classmethod
-    def calibrated(
+    def from_intrinsics(
         cls,
         focal_px: tuple[float, float],
         principal_px: tuple[float, float],
         columns: int,
         rows: int,
     ) -> Pinhole:
-        """Return the picture of a camera by its intrinsics, columns before rows.
+        """Return the picture from focal lengths and principal point, each (column, row), pixels.
 
         The optical axis is the first of the sensor's axes; the principal point may lie anywhere.
         """
@@ -74,37 +74,37 @@ class Pinhole:
 
     @property
     def middle_column(self) -> float:
-        """Column of the optical axis."""
+        """Column coordinate of the optical axis, pixels."""
         return 0.5 * self.columns if self.axis_column is None else self.axis_column
 
     @property
-    def focal(self) -> tuple[float, float]:
-        """Focal length in columns and rows."""
+    def focal_pixels(self) -> tuple[float, float]:
+        """Focal length in pixels along columns and along rows."""
         low, high = self.elevation_rad
         across = 2.0 * math.tan(0.5 * self.width_rad)
         return self.columns / across, self.rows / (math.tan(high) - math.tan(low))
 
     def pixel(self, azimuth_rad: ArrayLike, elevation_rad: ArrayLike) -> tuple[Any, Any]:
-        """Return column and row of directions in the sensor's axes; NaN behind the picture."""
+        """Return the picture's (column, row) of directions in sensor axes; NaN if behind."""
         turned = np.asarray(azimuth_rad) - self.azimuth_rad
         ahead = np.cos(turned)
         with np.errstate(divide="ignore", invalid="ignore"):
             across = np.where(ahead > 1e-9, np.tan(turned), np.nan)
             upward = np.where(ahead > 1e-9, np.tan(elevation_rad) / ahead, np.nan)
-        focal_x, focal_y = self.focal
+        focal_x, focal_y = self.focal_pixels
         return self.middle_column + focal_x * across, (
             focal_y * (math.tan(self.elevation_rad[1]) - upward)
         )
 
     def direction(self, column: ArrayLike, row: ArrayLike) -> tuple[Any, Any]:
         """Return azimuth and elevation in the sensor's axes of what is seen at a place."""
-        focal_x, focal_y = self.focal
+        focal_x, focal_y = self.focal_pixels
         across = (np.asarray(column) - self.middle_column) / focal_x
         upward = math.tan(self.elevation_rad[1]) - np.asarray(row) / focal_y
         return self.azimuth_rad + np.arctan(across), np.arctan2(upward, np.hypot(1.0, across))
 
-    def holds(self, column: FloatArray, row: FloatArray) -> Any:
-        """Return which places lie in the frame."""
+    def is_in_frame(self, column: FloatArray, row: FloatArray) -> Any:
+        """Return a mask of the picture positions (True) that lie inside the frame."""
         return (column >= 0) & (column <= self.columns) & (row >= 0) & (row <= self.rows)
 
 
@@ -115,7 +115,7 @@ def target_outlines(
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     bodies_m2: tuple[FloatArray, FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the outlines of targets' capsules and plates as unit vectors in NED.
+    """Return targets' capsule and plate outlines as unit vectors in north-east-down axes.
 
     Shapes (n, points, 3); the bodies are those of `components.optical.silhouette.union_area`, with
     front, side and horizontal areas. A circle is drawn as a polygon of its area. The outline lies
@@ -162,8 +162,8 @@ def target_outlines(
     return found[0], found[1]
 
 
-def common_part(one: FloatArray, other: FloatArray) -> FloatArray:
-    """Return the polygon that two convex ones have in common (Sutherland and Hodgman)."""
+def polygon_intersection(one: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the corners of two convex polygons' intersection, (n, 2); empty if none."""
     sense = np.sign(_cross(other[1] - other[0], other[2] - other[0])) if len(other) > 2 else 0.0
     if sense == 0.0:
         return np.empty((0, 2))
@@ -187,10 +187,10 @@ def _cross(a: FloatArray, b: FloatArray) -> Any:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
 
-def coverages(
+def polygon_pixel_shares(
     corners: FloatArray, rows: int, columns: int
 ) -> Iterator[tuple[tuple[slice, slice], FloatArray]]:
-    """Yield the box in the picture round each polygon (count, n, 2), and its share of each pixel.
+    """Yield each polygon's bounding box in the picture and the share of each pixel it covers.
 
     Exact to 1e-7. Each edge's part of a row hides what lies to the right of it: the mean, over that
     part, of the share of the pixel right of the edge is that of a clipped line, in closed form
@@ -246,18 +246,21 @@ def _ramp(u: FloatArray) -> FloatArray:
 def union_coverage(
     outlines: Sequence[FloatArray], rows: int, columns: int, smear: FloatArray
 ) -> FloatArray:
-    """Return the share of each pixel that two convex outlines cover together, over an exposure.
+    """Return the share of each pixel covered by the union of two convex outlines, averaged over the
+    exposure, (rows, columns).
 
     `smear` is how far they move meanwhile (x, y), pixels, half before and half after; the mean of
     so many exact pictures that the outline moves at most a quarter of a pixel between them, of 64
     beyond 16 pixels.
     """
     one, other = outlines
-    parts = ((1.0, one), (1.0, other), (-1.0, common_part(one, other)))
+    parts = ((1.0, one), (1.0, other), (-1.0, polygon_intersection(one, other)))
     steps = min(64, 1 + math.ceil(4.0 * float(np.hypot(*smear))))
     moved = ((np.arange(steps) + 0.5) / steps - 0.5)[:, np.newaxis, np.newaxis] * smear
     drawn = [
-        (sign, coverages(part + moved, rows, columns)) for sign, part in parts if len(part) > 2
+        (sign, polygon_pixel_shares(part + moved, rows, columns))
+        for sign, part in parts
+        if len(part) > 2
     ]
     total: FloatArray = np.zeros((rows, columns))
     for boxes in zip(*(covered for _, covered in drawn), strict=True):
@@ -267,7 +270,7 @@ def union_coverage(
 
 
 def grey_levels(picture: FloatArray, most: int) -> Any:
-    """Return a patch to be shown, eight bits a pixel, at most so many pixels wide."""
+    """Return a patch as 8-bit grey levels, with at most `most` pixels along a side."""
     largest = max(float(np.abs(picture).max()), 1e-12)
     grey = np.clip(128.0 - 120.0 * picture / largest, 0.0, 255.0).astype(np.uint8)
     step = max(1, math.ceil(len(grey) / most))
@@ -277,7 +280,7 @@ def grey_levels(picture: FloatArray, most: int) -> Any:
 def patch_angles(
     middle: FloatArray, right: FloatArray, down: FloatArray, offset: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return azimuths and elevations over a patch, linear in its pixels.
+    """Return a square patch's pixel azimuths and elevations, interpolated linearly, rad.
 
     They are those in its middle, and one patch to the right and down; `offset` (side,) is how far a
     row or column is from the middle, in patches.
@@ -290,13 +293,14 @@ def patch_angles(
     return azimuth, elevation
 
 
-def background(
+def textured_background(
     normal: Callable[[IntArray, IntArray], FloatArray],
     azimuth_rad: FloatArray,
     elevation_rad: FloatArray,
     grain_rad: float,
 ) -> FloatArray:
-    """Return a drawn background of mean 0 and standard deviation 1 that stands still in NED.
+    """Return random texture over a patch with mean 0 and standard deviation 1, fixed to directions
+    in north-east-down axes.
 
     Normal draws on a lattice of azimuth and elevation, smoothly interpolated (value noise) and
     scaled to the same variance everywhere. `normal` gives the draw of a lattice point by its two

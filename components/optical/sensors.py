@@ -13,10 +13,10 @@ from components.optical.contrast import Background
 from components.optical.infrared_area import AREA, Plume
 from components.optical.silhouette import union_area
 from components.optical.weather_effects import BandExtinction, Night
-from components.sensor.cued_looks import refuse_cues
+from components.sensor.cued_looks import refuse_if_cued
 from components.sensor.ladder_values import over_cells
 from components.sensor.look import Cells, Look, aspect_angles_of_cells
-from components.sensor.marks import EO, IR
+from components.sensor.palette import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS, Sensor
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
@@ -27,8 +27,8 @@ from dsa_des.block.wake import Wake
 _AREA = Quantity("area", "m²")
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the area a camera sees at every (scan, target), m².
+def measured_areas(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+    """Run a camera on a wake and return the visible area of every (scan, target), m².
 
     A range boundary sees none: it decides as a camera would whose every target shows the area that
     is just detected at the boundary. That area is taken, for the pixels, weights and threshold of
@@ -45,7 +45,9 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
                 * as_camera.pixel_azimuth_rad
                 * as_camera.pixel_elevation_rad
             )
-            needed = as_camera.signal_of(as_camera.detector.threshold, contrast)["pixels"]
+            needed = as_camera.signal_from_signature(as_camera.detector.threshold, contrast)[
+                "pixels"
+            ]
             return {_AREA.name: pixel_m2 * needed}
 
     else:
@@ -56,8 +58,10 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     return dict(over_cells(camera, wake, values))
 
 
-def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the rounding errors of the union of the bodies, against extended precision."""
+def silhouette_truth_errors(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+    """Return the rounding errors of the visible area in the given cells, against the same formula
+    in extended precision, m².
+    """
     if np.finfo(np.longdouble).eps >= np.finfo(np.float64).eps:
         raise Unavailable("not measured: this machine has no extended precision")
     camera: Any = block
@@ -103,8 +107,8 @@ def _ladder(band: str, type_name: str, *top: Rung) -> Ladder:
         ),
         "union",
         (_AREA,),
-        measure,
-        truth,
+        measured_areas,
+        silhouette_truth_errors,
         clears=("model",),
     )  # fmt: skip
 
@@ -255,7 +259,7 @@ class Projection(Camera):
         return area
 
     def contrast(self, cells: Cells) -> FloatArray:
-        """Return each target's colour contrast."""
+        """Return the colour contrast of each cell's target."""
         return cells.of_target(cells.roster.column(self.contrast_column))
 
 
@@ -328,10 +332,10 @@ class OpticalRangeBoundary(Sensor):
 
     def setup(self) -> None:
         """Refuse cues: everything inside the range is seen anyway."""
-        refuse_cues(self)
+        refuse_if_cued(self)
 
     def look(self, cells: Cells) -> Look:
-        """Detect every cell: the gate has kept those out of range away."""
+        """Return all cells as detected, targets out of range being skipped before, with margin."""
         # A metre is closer than any camera looks; it keeps the margin finite at range 0.
         ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
         return Look(np.ones(len(cells), dtype=bool), np.square(ratio) - 1.0)

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
-    angle,
     broadcast_flat,
+    check_angle_rad,
     check_not_negative,
     finite,
     positive,
@@ -46,12 +46,12 @@ def line_of_sight_rate(
     if model not in ("exact", "thesis"):
         raise ValueError(f"model is {model!r}: it must be 'exact' or 'thesis'")
     seen = np.asarray(seen_before, dtype=bool)
-    azimuth = angle("azimuth_rad", azimuth_rad)
-    elevation = angle("elevation_rad", elevation_rad)
-    previous_azimuth = angle(
+    azimuth = check_angle_rad("azimuth_rad", azimuth_rad)
+    elevation = check_angle_rad("elevation_rad", elevation_rad)
+    previous_azimuth = check_angle_rad(
         "previous_azimuth_rad", np.where(seen, _floats(previous_azimuth_rad), 0.0)
     )
-    previous_elevation = angle(
+    previous_elevation = check_angle_rad(
         "previous_elevation_rad", np.where(seen, _floats(previous_elevation_rad), 0.0)
     )
     interval = positive("interval_s", np.where(seen, _floats(interval_s), 1.0))
@@ -95,7 +95,7 @@ def pixels_covered(
     pixel_elevation_rad: ArrayLike,
     sensor_pixels: ArrayLike,
 ) -> Any:
-    """Count the pixels that a target's image covers, at most all of them (thesis eq. 14-15).
+    """Return how many pixels a target covers, at most the sensor's (thesis eq. 14-15).
 
     Q = area / (R² · pixel azimuth · pixel elevation), capped at the sensor's own pixel count
     (errata 10). At range 0 a target of any area fills the sensor.
@@ -129,7 +129,7 @@ def total_signature(
     static_weight: ArrayLike = 0.3,
     dynamic_weight: ArrayLike = 0.0,
 ) -> Any:
-    """Weigh size, contrast and speed into one signature (thesis eq. 18).
+    """Return the signature E = a Q P + b V from size, contrast and angular rate (thesis eq. 18).
 
     E = a · Q · P + b · V. The defaults a = 0.3, P = 1, b = 0 are the ones that reproduce
     Table 4.4 (errata 23).
@@ -229,7 +229,7 @@ class DynamicSignature(Effect[CellValues]):
         return Verdict(weight > 0, f"dynamic_weight is {weight:g}")
 
     def build(self, block: Any) -> CellValues:
-        """Return the term to add to every cell's signature."""
+        """Return a function that gives the dynamic term to add to each cell's signature."""
         return MovingTargets(block.p.dynamic_weight, block.p.rate, block.context.ticks_per_s)
 
 
@@ -250,15 +250,15 @@ class MovingTargets:
 
     def __call__(self, cells: Cells) -> FloatArray:
         """Return b·V of every cell."""
-        return self.weight_s * self.rate(cells)
+        return self.weight_s * self.line_of_sight_rate_rad_s(cells)
 
-    def rate(self, cells: Cells) -> FloatArray:
-        """Return each cell's rate of the line of sight since the scan before, rad/s.
+    def line_of_sight_rate_rad_s(self, cells: Cells) -> FloatArray:
+        """Return the angular rate of each cell's line of sight since the previous scan, rad/s.
 
         A target's first look has none, nor has the first after a scan that did not see it.
         """
         run, targets = cells.run_of_scan, len(cells.roster)
-        self._remember(int(run.max(initial=0)) + 1, targets)
+        self._grow_memory(int(run.max(initial=0)) + 1, targets)
         begins = np.append(True, run[1:] != run[:-1])
         # Before the scans of each run stands its last one.
         place = np.arange(len(run)) + np.cumsum(begins)
@@ -285,8 +285,8 @@ class MovingTargets:
             )
         )
 
-    def _remember(self, runs: int, targets: int) -> None:
-        """Remember so many runs at least."""
+    def _grow_memory(self, runs: int, targets: int) -> None:
+        """Enlarge the memory to at least the given number of runs."""
         known = len(self._tick)
         if known < runs:
             angles = np.full((2, runs, targets), np.nan)

@@ -8,9 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import angle, broadcast_flat, check_not_negative, unflatten
+from components.arguments.checks import (
+    broadcast_flat,
+    check_angle_rad,
+    check_not_negative,
+    unflatten,
+)
 from components.geometry import sine_and_cosine
-from dsa_des.arrays.column_values import first_row_if_constant
+from dsa_des.arrays.column_values import first_row_if_stored_once
 from dsa_des.arrays.types import FloatArray
 
 if TYPE_CHECKING:
@@ -24,7 +29,8 @@ def line_of_sight_in_target_axes(
     roll_rad: FloatArray,
     elevation_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Rotate the line of sight into the target's body axes (x nose, y right wing, z down).
+    """Return the line of sight as unit vector in the target's body axes (x nose, y right wing, z
+    down), and the sine of the angle off the nose.
 
     The line of sight runs from us to the target. Seen in a north-east-down frame turned so that
     its bearing is 0 it is (cos elevation, 0, -sin elevation); the target's yaw in that frame is
@@ -53,7 +59,7 @@ def line_of_sight_in_target_axes(
     sin_roll, cos_roll = sine_and_cosine(roll_rad)
     sin_elevation, cos_elevation = np.sin(elevation_rad), np.cos(elevation_rad)
     m = 0.0 - sin_elevation  # of one that flies level
-    if first_row_if_constant(pitch_rad).any():
+    if first_row_if_stored_once(pitch_rad).any():
         leaving = cos_yaw >= 0.0
         tilt = np.sin(np.where(leaving, pitch_rad - elevation_rad, pitch_rad + elevation_rad))
         side = 2.0 * sin_pitch * cos_elevation
@@ -69,7 +75,8 @@ def line_of_sight_in_target_axes(
 def front_and_back_area(
     cos_off_nose: FloatArray, front_m2: FloatArray, back_m2: FloatArray
 ) -> FloatArray:
-    """Mix the front and the back sphere by aspect (thesis eq. 20-21, errata 12).
+    """Return the average of front and back area, weighted by the cosine of the angle off the nose
+    (thesis eq. 20-21, errata 12).
 
     (back - front)·(cos/2 + 1/2) + front: the back alone when the target flies away (cos = 1), the
     front alone when it comes head on (cos = -1). Written as a mean of the two so that it never
@@ -89,7 +96,7 @@ def exact_area(
     horizontal_m2: FloatArray,
     back_m2: FloatArray | None,
 ) -> FloatArray:
-    """Sum the exact projections of sphere, cylinder and horizontal plane (errata 9).
+    """Return the sum of the exact projected sphere, cylinder and plane areas (errata 9), m².
 
     front + side·|x_body × u| + horizontal·|u_z|, with u the line of sight in the target's body
     axes. With `back_m2` the sphere becomes the mix of eq. 20-21 with cos g = x_body·u.
@@ -145,7 +152,7 @@ def union_area(
     round_m2 = front_m2 if back_m2 is None else front_and_back_area(u_x, front_m2, back_m2)
     capsule_m2 = round_m2 + side_m2 * sin_off_nose
     plate_m2 = horizontal_m2 * np.abs(u_z)
-    overlap_m2 = _overlap(
+    overlap_m2 = _overlap_area(
         np.abs(u_x * u_y),
         np.abs(u_z),
         sin_off_nose,
@@ -157,7 +164,7 @@ def union_area(
     return capsule_m2 + plate_m2 - np.clip(overlap_m2, 0.0, np.minimum(capsule_m2, plate_m2))
 
 
-def _overlap(
+def _overlap_area(
     slant: FloatArray,
     tilt: FloatArray,
     sin_off_nose: FloatArray,
@@ -166,7 +173,9 @@ def _overlap(
     horizontal_m2: FloatArray,
     plate_aspect_ratio: float,
 ) -> FloatArray:
-    """Integrate what the capsule and the plate cover twice; slant = |u_x u_y|, tilt = |u_z|."""
+    """Return the area that the projections of capsule and plate have in common, m²; slant = |u_x
+    u_y|, tilt = |u_z|.
+    """
     # Where nothing can overlap, harmless stand-ins keep the arithmetic finite.
     overlaps = (
         (tilt > _SMALLEST_PLATE_TILT) & (round_m2 > _SMALLEST_ROUND_M2) & (horizontal_m2 > 0.0)
@@ -222,7 +231,7 @@ def thesis_area(
     horizontal_m2: FloatArray,
     back_m2: FloatArray | None,
 ) -> FloatArray:
-    """Sum the projections as thesis eq. 9-13 give them (errata 4, 8, 12).
+    """Return the sum of the projected areas as in thesis eq. 9-13 (errata 4, 8, 12), m².
 
     With psi = relative heading, theta = elevation - pitch and phi = elevation - roll (eq. 6),
 
@@ -289,15 +298,15 @@ def visible_area(
         arrays: Any = (relative_heading_rad, pitch_rad, roll_rad, elevation_rad)
         return _PARAMETRIC[model](*arrays, front_m2, side_m2, horizontal_m2, back_m2)
     angles: dict[str, FloatArray] = {
-        "relative_heading_rad": angle("relative_heading_rad", relative_heading_rad),
-        "pitch_rad": angle("pitch_rad", pitch_rad),
-        "roll_rad": angle("roll_rad", roll_rad),
-        "elevation_rad": angle("elevation_rad", elevation_rad),
+        "relative_heading_rad": check_angle_rad("relative_heading_rad", relative_heading_rad),
+        "pitch_rad": check_angle_rad("pitch_rad", pitch_rad),
+        "roll_rad": check_angle_rad("roll_rad", roll_rad),
+        "elevation_rad": check_angle_rad("elevation_rad", elevation_rad),
     }
     if model not in MODELS:
         raise ValueError(f"model is {model!r}: it must be one of {', '.join(MODELS)}")
     if model == "aspect_table" or (model == "convex_hull" and mesh is not None):
-        return _measured_area(angles, model, table, mesh)
+        return _tabulated_or_mesh_area(angles, model, table, mesh)
 
     areas: dict[str, FloatArray] = {}
     for name, value in (
@@ -317,13 +326,13 @@ def visible_area(
     return unflatten(area, shape)
 
 
-def _measured_area(
+def _tabulated_or_mesh_area(
     angles: dict[str, FloatArray],
     model: str,
     table: SilhouetteTable | None,
     mesh: TriangleMesh | None,
 ) -> Any:
-    """Look the area up in a table or project the mesh."""
+    """Return the area from a silhouette table, or projected from a mesh."""
     shape, flat = broadcast_flat(**angles)
     u_x, u_y, u_z, _ = line_of_sight_in_target_axes(*flat)
     if mesh is not None and model == "convex_hull":

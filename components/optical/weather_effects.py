@@ -8,12 +8,12 @@ import numpy as np
 from components.atmosphere.infrared import (
     BANDS,
     band_extinction_per_m,
-    haze_share_at,
+    haze_extinction_ratio_at,
     long_wave_transmission,
     mid_wave_transmission,
     precipitable_water_mm,
 )
-from components.atmosphere.slant_path import share_between
+from components.atmosphere.slant_path import share_of_path_between
 from components.atmosphere.visibility import (
     KOSCHMIEDER,
     combined_visibility_m,
@@ -25,10 +25,10 @@ from components.environment.tables import Weather
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
-    cells_on_lines,
-    cells_verdict,
-    heights_within,
+    entry_and_exit_heights_m,
     weather_cells,
+    weather_cells_on_sight_lines,
+    weather_cells_verdict,
 )
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -65,7 +65,7 @@ class Visibility(Effect[CellValues]):
         return Verdict(False, "[weather] has no visibility_km, no rain and no fog")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's contrast."""
+        """Return a function that gives the factor on each cell's contrast by haze, fog and rain."""
         visibility_m = scene_visibility_m(block.context.sections["weather"])
         if visibility_m is None or infrared_band_of(block) is not None:
             return lambda cells: np.ones(len(cells))
@@ -77,7 +77,7 @@ class Visibility(Effect[CellValues]):
 
 
 class BandExtinction(Effect[CellValues]):
-    """What clear air, haze, fog and rain take from an infrared band's contrast."""
+    """Loss of an infrared camera's contrast by clear air, haze, fog and rain."""
 
     name = "extinction in the band"
     acts_on = CONTRAST
@@ -87,13 +87,13 @@ class BandExtinction(Effect[CellValues]):
         return Verdict(infrared_band_of(block) is not None, _describe_extinction_band(block))
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's contrast."""
+        """Return a function giving the factor on each cell's contrast by the air in its band."""
         band = infrared_band_of(block)
         if band is None:
             return lambda cells: np.ones(len(cells))
         weather = block.context.sections["weather"]
         density = weather.vapour_density_g_m3
-        extinction = band_extinction_per_m(band, *obscuration(weather))
+        extinction = band_extinction_per_m(band, *haze_visibility_and_rain_extinction(weather))
 
         def factor(cells: Cells) -> FloatArray:
             path = cells.range_m, cells.of_row("own_alt_m"), cells.alt_m
@@ -108,7 +108,7 @@ class BandExtinction(Effect[CellValues]):
 
 
 class ObscuringCells(Effect[CellValues]):
-    """What rain and fog of the scene's moving cells take, by what of a line of sight lies in each.
+    """Loss of contrast by moving cells of rain and fog, by the part of a line of sight in each.
 
     Rain below ``rain_top_m``, fog between its edges; in an infrared band as `BandExtinction` does.
     """
@@ -118,21 +118,21 @@ class ObscuringCells(Effect[CellValues]):
 
     def verdict(self, block: Any) -> Verdict:
         """Return whether weather cells obscure targets: one must come near."""
-        return cells_verdict(block)
+        return weather_cells_verdict(block)
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's contrast."""
+        """Return a function that gives the factor on each cell's contrast by the weather cells."""
         if not weather_cells(block):
             return lambda cells: np.ones(len(cells))
         weather = block.context.sections["weather"]
 
         def factor(cells: Cells) -> FloatArray:
             depth = np.zeros(len(cells))
-            for one, within in cells_on_lines(block, cells):
-                ends_m = heights_within(cells, within)
+            for one, within in weather_cells_on_sight_lines(block, cells):
+                ends_m = entry_and_exit_heights_m(cells, within)
                 low, high = np.minimum(*ends_m), np.maximum(*ends_m)
-                rain = share_between(low, high, -math.inf, weather.rain_top_m)
-                fog = share_between(low, high, weather.fog_base_m, weather.fog_top_m)
+                rain = share_of_path_between(low, high, -math.inf, weather.rain_top_m)
+                fog = share_of_path_between(low, high, weather.fog_base_m, weather.fog_top_m)
                 per_m = rain * float(rain_extinction_per_m(one.rain_rate_mm_h))
                 per_m += fog * _fog_per_m(block, one.fog_water_g_m3)
                 depth += per_m * cells.range_m * (within.leaves - within.enters)
@@ -150,7 +150,11 @@ def _fog_per_m(block: Any, water_g_m3: float) -> float:
     if (band := infrared_band_of(block)) is not None:
         return band_extinction_per_m(band, visibility_m)
     wavelength_um = getattr(block.p, "wavelength_um", None)
-    share = 1.0 if wavelength_um is None else float(haze_share_at(visibility_m, wavelength_um))
+    share = (
+        1.0
+        if wavelength_um is None
+        else float(haze_extinction_ratio_at(visibility_m, wavelength_um))
+    )
     return share * KOSCHMIEDER / visibility_m
 
 
@@ -158,7 +162,7 @@ TRANSMISSION = Hook("light", CellValues, "share of each cell's light that is lef
 
 
 class CellsInTheWay(ObscuringCells):
-    """The same of a laser's pulse, on each way, and of what somebody who looks out searches for."""
+    """Transmission through moving weather cells: a laser pulse (each way), a lookout's search."""
 
     acts_on = TRANSMISSION
 
@@ -173,7 +177,7 @@ DARKNESS = Hook("darkness", bool, "whether it is too dark to see anything")
 
 
 class Night(Effect[bool]):
-    """Without daylight a camera for visible light sees nothing; lights are not simulated."""
+    """At night a camera for visible light detects nothing; lights are not simulated."""
 
     name = "night"
     acts_on = DARKNESS
@@ -196,13 +200,13 @@ def _describe_extinction_band(block: Any) -> str:
 
 
 def infrared_band_of(block: Any) -> str | None:
-    """Return the infrared band of a camera whose air is that of its band, or None."""
+    """Return the camera's ``extinction_band`` if that is an infrared band, else None."""
     band = getattr(block.p, "extinction_band", None)
     return band if band in BANDS else None
 
 
-def obscuration(weather: Weather) -> tuple[float | None, float]:
-    """Return the visibility in haze or fog alone (m), and the extinction by rain (1/m)."""
+def haze_visibility_and_rain_extinction(weather: Weather) -> tuple[float | None, float]:
+    """Return haze or fog's visibility (m; None if unlimited), and rain's extinction (1/m)."""
     rain = float(rain_extinction_per_m(weather.rain_rate_mm_h))
     if weather.visibility_km is not None:
         # The scene's visibility is that of all together: what rain does not take is haze.

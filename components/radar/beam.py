@@ -86,7 +86,7 @@ def first_illumination(
     swept = np.where(swept > 0.5 * (width_rad + TWO_PI), swept - TWO_PI, swept)
 
     def lead(offset: FloatArray) -> FloatArray:
-        """Return how far the target is ahead of the beam."""
+        """Return by what azimuth (rad) a target leads the beam at a time after the scan start."""
         ahead: FloatArray = swept + wrap_pi(azimuth_at(offset) - azimuth_rad) - beam_rate * offset
         return ahead
 
@@ -144,7 +144,7 @@ BEAM_SHAPE = Hook(
 
 
 class OffAxis:
-    """The share of the echoes of targets off the axes of one radar's beams."""
+    """The factor on echoes of targets off the axes of a radar's beams; called with cells."""
 
     def __init__(self, block: Any) -> None:
         self._block = block
@@ -175,7 +175,7 @@ class OffAxis:
 
 
 class BeamShape(Effect[CellValues]):
-    """Beam-shape loss of a target off the axis: between beam positions, or the mean of a sweep.
+    """Beam-shape loss of targets off the axis: between beam positions, or averaged in a sweep.
 
     The scan's beams stand side by side and in bars, ``beam_spacing`` beamwidths apart at most; a
     target is looked at by the nearest. A beam that sweeps passes over it in azimuth: its pulses
@@ -198,7 +198,7 @@ class LitTargets(GatedTargets):
 
 
 class Sweep:
-    """The sweep of one radar's beam; called with a report, it adds when everything was lit."""
+    """The sweep of one radar's beam; called with a report, it adds each illumination's time."""
 
     def __init__(self, block: Any) -> None:
         self.period_s = float(1 / block.p.scan_rate_hz)
@@ -227,7 +227,7 @@ class Sweep:
         at_start = targets.take(rows)
         revisit = at_start.revisit
         assert revisit is not None
-        start_s = (at_start.picture_tick / self._ticks_per_s)[:, np.newaxis]
+        start_s = (at_start.position_ticks / self._ticks_per_s)[:, np.newaxis]
         seen: dict[str, Any] = {}
 
         def azimuth_at(offset_s: FloatArray) -> FloatArray:
@@ -243,7 +243,7 @@ class Sweep:
             offset_s, met = np.where(cued, 0.0, offset_s), met | cued
         azimuth_at(offset_s)
         lit = replace(at_start, **seen)
-        reason = block.axes.reach(block.reach).decide(
+        reason = block.axes.reach_in_body_axes(block.reach).skip_reasons(
             lit.body_azimuth_rad, lit.body_elevation_rad, lit.range_m, lit.present, lit.hidden
         )
         reason[~met & ((reason == EVALUATE) | (reason == RANGE))] = FIELD_OF_VIEW
@@ -267,14 +267,16 @@ class Sweep:
         assert isinstance(targets, LitTargets)
         scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
-        own = self._own_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
+        own = self._own_pose_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
         after = np.rint(offset_s * self._ticks_per_s).astype(np.int64)
         return replace(detections, extras=extras, own_of_entries=own, ticks_after=after)
 
-    def _own_when_lit(
+    def _own_pose_when_lit(
         self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray
     ) -> dict[str, FloatArray] | None:
-        """Return the believed pose at each entry's own instant, with the error of its scan."""
+        """Return the believed pose at each detection's own instant by column, with the navigation
+        error of its scan; None without one.
+        """
         believed = detections.pose_columns()
         if not believed or targets.revisit is None or not len(targets.roster):
             return None
@@ -282,7 +284,7 @@ class Sweep:
             return believed
         # Where the ownship is does not depend on the target that is asked for with it.
         flights, anyone = targets.revisit.take_rows(row), np.zeros(1, dtype=np.int64)
-        start_s = targets.picture_tick[row] / self._ticks_per_s
+        start_s = targets.position_ticks[row] / self._ticks_per_s
         before, then = (
             flights(anyone, time_s[:, np.newaxis])["own"]
             for time_s in (start_s, start_s + offset_s)
@@ -296,7 +298,7 @@ class Sweep:
 
 
 class BeamSweep(Effect[ReportTransform]):
-    """A beam that sweeps once per scan lights each target at an instant of its own.
+    """Each target is illuminated at its own instant by a beam that sweeps once per scan.
 
     Everything about a target is then that of this instant: whether it is in reach, its SNR, its
     measured and true position. A target that the beam does not meet counts as outside the field of
@@ -322,20 +324,22 @@ class SweepingSensor(Sensor):
         return self.context.effects.get(BeamSweep.name)
 
     def records(self) -> list[type[Message]]:
-        """Return what is recorded: where a beam sweeps, the ownship at each entry's instant."""
+        """Return the recorded message types; if sweeping, also the ownship's at detections."""
         return [*super().records(), *([] if self._sweep is None else [OwnOfEntries])]
 
     def request(self, port: str) -> Any:
-        """Return a request for the targets in reach, at the times at which the sweep meets them."""
+        """Return a request for the targets in reach, over the duration of a sweep."""
         reach = super().request(port)
         if self._sweep is None or not self.p.enabled:
             return reach
         return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
 
-    def see_targets(
+    def observed_targets_and_rows(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets at the instants at which the beam lights them."""
+        """Return the targets at the instants of their illumination and the rows of the scans in
+        them; unchanged without a sweep.
+        """
         if self._sweep is None:
             return targets, rows
         return self._sweep.illuminate(targets, rows, cued), np.arange(len(rows))

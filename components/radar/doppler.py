@@ -76,7 +76,7 @@ class MovingTargetFilter:
             raise ValueError(
                 f"pulses is {self.pulses}: it must be from {FEWEST_PULSES} to {MOST_PULSES}"
             )
-        if self.kind == "filter_bank" and not len(self._usable):
+        if self.kind == "filter_bank" and not len(self._usable_filter_centres):
             raise ValueError(
                 f"notch_m_s is {self.notch_m_s:g}: it leaves no filter of the {self.pulses} "
                 f"between the clutter and {self.unambiguous_m_s:g} m/s, the unambiguous velocity"
@@ -89,12 +89,12 @@ class MovingTargetFilter:
 
     @property
     def unambiguous_m_s(self) -> float:
-        """Largest unambiguous range rate, λ·PRF/4."""
+        """Largest unambiguous range rate, λ·PRF/4, m/s."""
         return 0.25 * self.wavelength_m * self.prf_hz
 
     @property
-    def _usable(self) -> FloatArray:
-        """Centres of the bank's filters that are used, in PRF, in [-1/2, 1/2)."""
+    def _usable_filter_centres(self) -> FloatArray:
+        """The bank's used filters' centre frequencies, fractions of the PRF in [-1/2, 1/2)."""
         number = np.arange(self.pulses) - self.pulses // 2
         centre = number / self.pulses
         notch = 2.0 / self.pulses
@@ -103,13 +103,13 @@ class MovingTargetFilter:
         outside = np.abs(centre) >= notch * (1.0 - 1e-12)
         return np.asarray(centre[outside & (number != 0)])
 
-    def gains(
+    def target_and_clutter_gains(
         self,
         target_m_s: ArrayLike,
         clutter_m_s: ArrayLike = 0.0,
         spread_m_s: ArrayLike = 0.0,
     ) -> tuple[Any, Any]:
-        """Return the gains of a target's power, and of the clutter's where the target is sought.
+        """Return the filter's power gains for targets, and for clutter in the same filter.
 
         Factors of the power over noise. Range rates are against the velocity at which the notch
         lies, and `spread_m_s` is the standard deviation of the clutter's.
@@ -124,30 +124,32 @@ class MovingTargetFilter:
         turn, away, width = target * per_m_s, clutter * per_m_s, spread * per_m_s
         tuned: Any = 0.0
         if self.kind == "filter_bank":
-            usable = self._usable
+            usable = self._usable_filter_centres
             # The nearest on the circle, the lower one of two as near.
             apart = np.abs(turn[:, np.newaxis] - usable)
             apart = np.abs(apart - np.rint(apart))
             tuned = usable[np.argmin(apart, axis=1)]
-        lags = _lags(self.kind, self.pulses)
-        passed = _power(lags, turn - tuned, np.zeros(1))
-        residue = _power(lags, away - tuned, width)
+        lags = _weight_autocorrelation(self.kind, self.pulses)
+        passed = _filter_power_gain(lags, turn - tuned, np.zeros(1))
+        residue = _filter_power_gain(lags, away - tuned, width)
         return unflatten(passed, shape), unflatten(residue, shape)
 
-    def improvement(self, spread_m_s: float) -> float:
+    def improvement_factor(self, spread_m_s: float) -> float:
         """Return the clutter improvement factor: mean gain of targets over that of clutter, linear.
 
         The clutter's mean lies in the notch. For cancellers and a small spread it is 2 (PRF / 2 pi
         s)² and 2 (PRF / 2 pi s)⁴, with s = 2 spread / λ (Skolnik, section 3.7).
         """
         every = (np.arange(4096) + 0.5) / 4096 * self.blind_speed_m_s
-        target, clutter = self.gains(every, 0.0, spread_m_s)
+        target, clutter = self.target_and_clutter_gains(every, 0.0, spread_m_s)
         return float(np.mean(target) / np.mean(clutter))
 
 
 @lru_cache(maxsize=64)
-def _lags(kind: str, pulses: int) -> tuple[float, ...]:
-    """Return the weights' autocorrelation over what noise, or N pulses in phase, come to."""
+def _weight_autocorrelation(kind: str, pulses: int) -> tuple[float, ...]:
+    """Return the one-sided autocorrelation of the filter's weights, normalised to the gain of noise
+    or of a pulse train.
+    """
     if kind in _WEIGHTS:
         weights = np.array(_WEIGHTS[kind])
         over = float(np.sum(weights**2))
@@ -158,7 +160,7 @@ def _lags(kind: str, pulses: int) -> tuple[float, ...]:
     return tuple((one_sided / over).tolist())
 
 
-def _power(lags: tuple[float, ...], turn: FloatArray, width: FloatArray) -> FloatArray:
+def _filter_power_gain(lags: tuple[float, ...], turn: FloatArray, width: FloatArray) -> FloatArray:
     """Return sum over lags of r(m) exp(-2 (pi m width)²) cos(2 pi m turn), never below 0."""
     # 1 - cos(x) = 2 sin²(x/2) and expm1 keep the digits of a small residue: all lags sum up to
     # the power at turn 0, which is known.
@@ -198,7 +200,7 @@ _BEHIND = tuple(-point for point in _AHEAD[0]), tuple(-weight for weight in _AHE
 
 
 class RangeRates(Protocol):
-    """Gives true range rates."""
+    """Function that returns the true range rates of some cells."""
 
     def __call__(self, cells: Cells, detected: IntArray, /) -> FloatArray:
         """Return the range rates of some cells, m/s."""
@@ -208,13 +210,13 @@ RANGE_RATE = Hook("range rate", RangeRates, "rate of some cells' slant range, m/
 
 
 def range_rates(cells: Cells, detected: IntArray) -> FloatArray:
-    """Return the rate of the slant range of some cells, m/s, positive when it opens.
+    """Return the true range rate of each of the given cells, m/s, positive when the range opens.
 
     Differences of the range itself over a few hundredths of a second, by the scene's own model of
     the Earth, whatever the two fly. Where one of them changes its velocity at once within that
     time, the rate is between the one before and the one after.
     """
-    (rate,) = _rates_of(cells, detected, lambda seen, times: (seen["range_m"],))
+    (rate,) = _rates_of_quantities(cells, detected, lambda seen, times: (seen["range_m"],))
     return rate
 
 
@@ -231,8 +233,10 @@ class RangeRate(Effect[RangeRates]):
         return range_rates
 
 
-def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
-    """Return the rate of each cell's slant range, and the ownship's velocity over ground then, m/s.
+def range_rate_and_own_velocity(
+    cells: Cells,
+) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray]]:
+    """Return cells' range rates and the ownship's ground velocity (north, east, down), m/s.
 
     The rate is positive when the range opens, the velocity in the ownship's own north-east-down
     frame.
@@ -244,16 +248,16 @@ def motion_of_cells(cells: Cells) -> tuple[FloatArray, tuple[FloatArray, FloatAr
         first = [np.tile(values[: len(values) // times], times) for values in there]
         return (seen["range_m"], *north_east_up(*first, *there))
 
-    rate, north, east, up = _rates_of(cells, np.arange(len(cells)), quantities)
+    rate, north, east, up = _rates_of_quantities(cells, np.arange(len(cells)), quantities)
     return rate, (north, east, -up)
 
 
-def _rates_of(
+def _rates_of_quantities(
     cells: Cells,
     detected: IntArray,
     quantities: Callable[[Mapping[str, Any], int], tuple[FloatArray, ...]],
 ) -> list[FloatArray]:
-    """Return the rates of quantities of some cells, from differences over a few steps."""
+    """Return the time derivatives of the quantities of some cells, by finite differences."""
     rates: list[FloatArray] = []
     missing = np.arange(len(detected))
     for points, weights in (_CENTRAL, _AHEAD, _BEHIND):
@@ -277,7 +281,7 @@ _LEAST_GAIN = 1e-30
 
 
 class DopplerProcessing:
-    """The gains of one radar's filter; called with cells."""
+    """One radar's Doppler gains for targets and clutter; called with cells and echoes."""
 
     def __init__(self, block: Any) -> None:
         p = block.p
@@ -292,22 +296,24 @@ class DopplerProcessing:
         """Return the factors on the power of each cell's target and of each echo beside it."""
         if len(cells) == 0:
             return np.empty(0), [np.empty(0)] * len(echoes)
-        range_rate_m_s, velocity_m_s = motion_of_cells(cells)
-        ground_m_s = -self._along_ground(cells, velocity_m_s)
+        range_rate_m_s, velocity_m_s = range_rate_and_own_velocity(cells)
+        ground_m_s = -self._speed_towards_ground(cells, velocity_m_s)
         centre_m_s = ground_m_s if self._locked else np.zeros(len(cells))
-        passed, _ = self._filter.gains(range_rate_m_s - centre_m_s)
+        passed, _ = self._filter.target_and_clutter_gains(range_rate_m_s - centre_m_s)
         residues = []
         for echo in echoes:
-            rate_m_s, spread_m_s = echo.range_rates(cells, velocity_m_s, ground_m_s)
-            _, residue = self._filter.gains(
+            rate_m_s, spread_m_s = echo.range_rate_mean_and_spread(cells, velocity_m_s, ground_m_s)
+            _, residue = self._filter.target_and_clutter_gains(
                 range_rate_m_s - centre_m_s, rate_m_s - centre_m_s, spread_m_s
             )
             residues.append(residue + self._limit)
         # In the middle of the notch there is still a look, at noise.
         return np.maximum(passed, _LEAST_GAIN), residues
 
-    def _along_ground(self, cells: Cells, velocity_m_s: tuple[FloatArray, ...]) -> FloatArray:
-        """Return the ownship's velocity towards the ground in each target's range cell."""
+    def _speed_towards_ground(
+        self, cells: Cells, velocity_m_s: tuple[FloatArray, ...]
+    ) -> FloatArray:
+        """Return the ownship's speed towards the ground in each target's range cell, m/s."""
         elevation_rad = cells.elevation_rad
         if self._terrain is not None:
             height_m = cells.of_row("own_alt_m") - self._terrain.height_m

@@ -31,7 +31,7 @@ _OF_CUED = 2**40
 
 
 class NoiseReports:
-    """Draws each scan's false alarms with keys of their own.
+    """Adds random false alarms by noise to a radar's reports, scan by scan.
 
     Within cue cones, where a radar looks otherwise, noise crosses the threshold of there.
     """
@@ -44,13 +44,13 @@ class NoiseReports:
 
     @cached_property
     def _crossings(self) -> list[Crossing]:
-        """Thresholds elsewhere and, where it is another, within cue cones; known after setup."""
+        """Thresholds outside and, if they differ, inside cue cones; available after setup."""
         block = self._block
         cued = block.cued_crossing() if block.built(CUE) else None
         return [block.crossing] + ([] if cued is None else [cued])
 
     def refuse_too_many(self) -> None:
-        """Refuse a threshold that noise crosses too often, once it is known."""
+        """Raise ValueError if noise crosses the threshold too often per scan."""
         block = self._block
         for crossing in self._crossings:
             expected = self._cells.count * crossing.false_alarm_probability
@@ -145,7 +145,7 @@ _OF_GROUND = np.uint64(2**41)
 
 
 class _CellsWithoutTarget:
-    """Cells without a target as effects on the SNR ask for them."""
+    """Stand-in for cells without a target, passed to effects on the SNR."""
 
     def __init__(
         self, range_m: FloatArray, own_alt_m: float, elevation_rad: FloatArray, alt_m: FloatArray
@@ -157,13 +157,13 @@ class _CellsWithoutTarget:
         return len(self.range_m)
 
     def of_row(self, name: str) -> AnyArray:
-        """Return the ownship's altitude for each cell."""
+        """Return the ownship's altitude for each cell, m; no other name is known."""
         assert name == "own_alt_m"
         return np.full(len(self), self._own_alt_m)
 
 
 class GroundReports:
-    """Draws for every cell that holds ground, keyed by cell and scan."""
+    """Adds random reports of ground clutter to a radar's reports, drawn by cell and scan."""
 
     def __init__(self, block: Any) -> None:
         self._block, self._terrain = block, terrain_of(block)
@@ -194,8 +194,8 @@ class GroundReports:
 
     @cached_property
     def _body(self) -> Vector:
-        """Where the beams truly point in body axes; the sensor's are known once all is built."""
-        x, y, z = unit_vector(*self._block.axes.true_direction(*self._beams))
+        """Unit vectors along the true directions of all beams in body axes."""
+        x, y, z = unit_vector(*self._block.axes.true_direction_in_body(*self._beams))
         return x, y, z
 
     def __call__(
@@ -233,7 +233,9 @@ class GroundReports:
     def _find_ground_crossings(
         self, targets: RelativeTargets, row: int, run: int, scan: int
     ) -> tuple[IntArray, FloatArray]:
-        """Return the cells that the ground crosses the threshold in, and their CNR."""
+        """Return the indices of the cells in which ground clutter crosses the threshold in a scan,
+        and their clutter-to-noise ratios.
+        """
         if targets.own_attitude is None:
             raise ValueError("clutter's false alarms need to know how the ownship is turned")
         own_alt_m = float(targets.own_alt_m[row])
@@ -242,7 +244,7 @@ class GroundReports:
         ]
         elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
         parts = [
-            (depth + beam * self._cells.range, *self._clutter(own_alt_m, depth, away))
+            (depth + beam * self._cells.range, *self._clutter_pfa_and_cnr(own_alt_m, depth, away))
             for depth, beam, away in self._lit_cells(own_alt_m, elevation_rad)
         ]
         if not parts:
@@ -264,7 +266,7 @@ class GroundReports:
     def _lit_cells(
         self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
-        """Yield each range cell with clutter, the beams that meet it, and their directions."""
+        """Yield each clutter range cell's index, its beams' indices and elevations (rad)."""
         if any(echo.diffuse for echo in self._block.echoes):
             everywhere = np.arange(len(elevation_rad))
             for depth in range(len(self._range_m)):
@@ -279,10 +281,10 @@ class GroundReports:
                 if len(beam):
                     yield depth, beam, elevation_rad[beam]
 
-    def _clutter(
+    def _clutter_pfa_and_cnr(
         self, own_alt_m: float, depth: int, elevation_rad: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return how often the clutter in some cells crosses the threshold, and its CNR."""
+        """Return the chance that clutter in a cell's beams is detected, and its ratio to noise."""
         range_m = np.full(len(elevation_rad), self._range_m[depth])
         echoes, powers = self._block.echoes, []
         for echo in echoes:
@@ -341,7 +343,7 @@ NO_FALSE_ALARMS_PER_SCAN = 1e-6
 
 
 def high_pfa_warnings(parameters: Any, snr_db: float) -> list[str]:
-    """Return a warning if the Pfa is so high that echoes below the noise are detected."""
+    """Return a warning in a list if Pfa lets echoes below the noise be detected; else none."""
     pfa = parameters.false_alarm_probability
     if pfa < HIGH_FALSE_ALARM_PROBABILITY or not math.isfinite(snr_db):
         return []

@@ -32,7 +32,7 @@ _LN_2 = math.log(2.0)
 
 
 def height_above_terrain_m(own_alt_m: ArrayLike, terrain_alt_m: ArrayLike) -> Any:
-    """Return the height above terrain, or refuse terrain as high as the ownship or higher."""
+    """Return the height above terrain, m; raise ValueError if it is not above 0."""
     shape, (own, terrain) = broadcast_flat(
         own_alt_m=finite("own_alt_m", own_alt_m),
         terrain_alt_m=finite("terrain_alt_m", terrain_alt_m),
@@ -57,7 +57,7 @@ def ground_clutter_rcs_m2(
     elevation_beamwidth_rad: float,
     range_resolution_m: float,
 ) -> Any:
-    """Return the RCS of the ground in the range cell of a target at which the beam points.
+    """Return the ground's RCS in the cell at each slant range, for a beam's elevation, m².
 
     `gamma_db` is the reflectivity γ of σ0 = γ sin(grazing): about -20 for a smooth desert or sea,
     -15 for farmland, -10 for woodland and -5 for a town, with ±5 dB between places. Beamwidths are
@@ -103,7 +103,7 @@ def ground_clutter_rcs_m2(
 def ground_ring_rcs_m2(
     range_m: ArrayLike, height_m: ArrayLike, *, gamma_db: float, range_resolution_m: float
 ) -> Any:
-    """Return the RCS of the ground at a slant range in all directions, which sidelobes meet.
+    """Return the RCS of a ring of ground at a slant range all around, as sidelobes see it, m².
 
     σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area whatever
     the height. 0 nearer than the height.
@@ -126,7 +126,7 @@ def altitude_line_rcs_m2(
     slope_rad: float,
     reflectivity: float,
 ) -> Any:
-    """Return the RCS of the ground below that mirrors, in a range cell around a slant range, m².
+    """Return the altitude line's RCS (specular ground below) in a slant range's cell, m².
 
     Facets that lie level mirror what comes from straight above: σ0 = ρ² / tan² β0 · exp(-tan² θ /
     tan² β0) at an angle θ from the vertical, of facets whose slopes have tan β0 (the
@@ -157,7 +157,7 @@ Velocity = tuple[FloatArray, FloatArray, FloatArray]
 
 @dataclass(frozen=True)
 class Clutter:
-    """Power over noise by the cells of a look: of the ground amid the beam, and of diffuse clutter.
+    """Each cell's clutter-to-noise ratios: the beam's ground (`mean`), and diffuse clutter.
 
     Diffuse is what is more noise: rain, and what sidelobes meet.
     """
@@ -180,7 +180,7 @@ class Clutter:
 
     @property
     def total(self) -> FloatArray:
-        """Both together."""
+        """Mean and diffuse clutter added."""
         return self.mean + self.diffuse
 
     def take(self, cells: Any) -> Clutter:
@@ -189,7 +189,7 @@ class Clutter:
 
 
 class Echo:
-    """An echo beside the target; called with cells, it returns its RCS in m²."""
+    """A source of clutter in the target's cell; called with cells, it returns its RCS in m²."""
 
     #: Whether it adds to noise; else it is the mean that ``clutter_mean`` speaks of.
     diffuse = True
@@ -203,10 +203,10 @@ class Echo:
         """Return the RCS in each cell's resolution cell, m²."""
         raise NotImplementedError
 
-    def range_rates(
+    def range_rate_mean_and_spread(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return mean and standard deviation of its range rates in each cell, m/s.
+        """Return mean and standard deviation of the clutter's range rate in each cell, m/s.
 
         `own_m_s` is the ownship's velocity over ground, `ground_m_s` the range rate of the ground
         on the beam's axis.
@@ -214,8 +214,8 @@ class Echo:
         raise NotImplementedError
 
 
-def altitude_line_of(block: Any, range_m: FloatArray, height_m: FloatArray) -> FloatArray:
-    """Return the RCS of the altitude line of a scene's ground; 0 where it has no facets."""
+def scene_altitude_line_rcs_m2(block: Any, range_m: FloatArray, height_m: FloatArray) -> FloatArray:
+    """Return the altitude line's RCS for the scene's terrain, m²; 0 without a facet slope."""
     terrain = terrain_of(block)
     if terrain.facet_slope_deg is None:
         return np.zeros(len(range_m))
@@ -255,26 +255,26 @@ class GroundEcho(Echo):
         )
         return np.asarray(rcs)
 
-    def range_rates(
+    def range_rate_mean_and_spread(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Spread by the beam's width across the ownship's course, and by the ground's own."""
+        """Return cells' ground range rate, and its spread by beamwidth and ground motion, m/s."""
         speed_m_s = np.sqrt(sum(part * part for part in own_m_s))
         platform = platform_spread_m_s(speed_m_s, ground_m_s, self.beam_rad[0])
         return ground_m_s, np.hypot(self.terrain.clutter_motion_m_s, platform)
 
 
 class NoEcho(Echo):
-    """Nothing."""
+    """Clutter of zero power."""
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return 0 for each cell."""
         return np.zeros(len(cells))
 
-    def range_rates(
+    def range_rate_mean_and_spread(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Of nothing: those of the ground."""
+        """Return the ground's range rate and a spread of 0 in each cell, m/s."""
         return ground_m_s, np.zeros(len(cells))
 
 
@@ -303,7 +303,7 @@ class GroundClutter(Effect[Echo]):
         return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
 
     def build(self, block: Any) -> Echo:
-        """Return each cell's ground clutter as an RCS, m²; without terrain it is 0."""
+        """Return the ground's echo; one of zero power where ground clutter is not simulated."""
         terrain = terrain_of(block)
         if not self.verdict(block).simulated:
             return NoEcho(block)
@@ -332,7 +332,7 @@ class GroundClutter(Effect[Echo]):
 
 
 def terrain_of(block: Any) -> Any:
-    """Return the terrain of a block's scene, or None where there is none."""
+    """Return the ``[terrain]`` of a block's scene; None if it is missing or has no height_m."""
     terrain = block.context.sections.get("terrain")
     return None if terrain is None or terrain.height_m is None else terrain
 
@@ -360,8 +360,8 @@ def platform_spread_m_s(
     return unflatten(_BEAM_DEVIATION * float(beamwidth_rad) * across, shape)
 
 
-def clutter_as_signal(parameters: Any, terrain: Any) -> list[str]:
-    """Warn that clutter counts as signal where the threshold stays at the noise."""
+def clutter_as_signal_warnings(parameters: Any, terrain: Any) -> list[str]:
+    """Return a warning in a list if clutter counts as signal: threshold at the noise level."""
     if terrain is None or parameters.clutter_threshold != "noise":
         return []
     return [

@@ -68,7 +68,7 @@ class LinkBudget:
             nearest = float(positive("minimum_range_m", self.minimum_range_m))
             if nearest < SMALLEST_MINIMUM_RANGE_M:
                 raise ValueError(f"minimum_range_m is {nearest:g}: it must be at least 0.001")
-        positive("constant_m2", self.constant_m2)
+        positive("constant_m2", self.snr_constant_m2)
 
     @property
     def wavelength(self) -> float:
@@ -78,8 +78,8 @@ class LinkBudget:
         return float(wavelength(self.frequency_hz if self.frequency_hz is not None else 0.0))
 
     @cached_property
-    def constant_m2(self) -> float:
-        """Return the factor in m² that multiplies RCS/range⁴ to give the SNR.
+    def snr_constant_m2(self) -> float:
+        """Factor that gives the SNR when multiplied by RCS / range⁴, m².
 
         Pt G² λ² G_I / ((4 pi)³ k T0 F B L) with T0 = 290 K and one antenna for both ways: thesis
         eq. 7 and 8, completed by the coherent integration gain G_I, the noise figure F and the
@@ -122,7 +122,7 @@ class LinkBudget:
         return unflatten(self.snr_of_cells(distance, rcs), shape)
 
     def snr_of_cells(self, range_m: FloatArray, rcs_m2: FloatArray) -> FloatArray:
-        """Return linear SNR for flat arrays of one shape that are known to be 0 or more.
+        """Return the linear SNR for flat arrays of equal shape and valid values.
 
         Closer than `nearest_m` the far-field equation does not hold and the receiver is still
         blind from its own pulse.
@@ -134,7 +134,7 @@ class LinkBudget:
         # their product overflows on the way. An echo from the end of the number range is 0.
         with np.errstate(under="ignore", over="ignore"):
             square = safe * safe
-            echo = (self.constant_m2 / square) * (rcs_m2 / square)
+            echo = (self.snr_constant_m2 / square) * (rcs_m2 / square)
         return np.where(near, 0.0, np.minimum(echo, _LARGEST))
 
     def range_for_snr(self, snr: ArrayLike, rcs_m2: ArrayLike) -> Any:
@@ -146,7 +146,7 @@ class LinkBudget:
             snr=positive("snr", snr), rcs_m2=check_not_negative("rcs_m2", rcs_m2)
         )
         with np.errstate(under="ignore", over="ignore"):  # ends of the number range
-            fourth = self.constant_m2 * rcs / ratio
+            fourth = self.snr_constant_m2 * rcs / ratio
         return unflatten(np.sqrt(np.sqrt(fourth)), shape)
 
 
@@ -230,12 +230,12 @@ def implausible_value_warnings(parameters: Any) -> list[str]:
         if value is None or low <= value <= high:
             continue
         text = f"{key} is {value:g} {unit}: implausible, radars have {low:g} to {high:g} {unit}"
-        said.append(text + _describe_plausible_unit(value, low, high, unit))
+        said.append(text + _plausible_unit_hint(value, low, high, unit))
     return said
 
 
-def _describe_plausible_unit(value: float, low: float, high: float, unit: str) -> str:
-    """Name a multiple of the unit in which the number would be plausible."""
+def _plausible_unit_hint(value: float, low: float, high: float, unit: str) -> str:
+    """Return a question naming the unit that makes the value plausible, or an empty string."""
     if unit == "dB":
         return ""
     for factor in (1e9, 1e6, 1e3, 1e-3, 1e-6):
@@ -250,8 +250,8 @@ GAIN_TIMES_BEAM = 30_000.0
 MOST_GAIN_DISAGREEMENT_DB = 3.0
 
 
-def gain_of_beam_db(azimuth_deg: float | None, elevation_deg: float | None) -> float:
-    """Return the gain of an antenna with some beamwidths; 0 dB where they are not known."""
+def antenna_gain_from_beam_db(azimuth_deg: float | None, elevation_deg: float | None) -> float:
+    """Return the antenna gain that two beamwidths imply, dB; 0 dB if one is not known."""
     if not (azimuth_deg and elevation_deg):
         return 0.0
     return max(0.0, 10.0 * math.log10(GAIN_TIMES_BEAM / (azimuth_deg * elevation_deg)))

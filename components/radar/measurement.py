@@ -41,11 +41,11 @@ def angle_variance(
     Modeling, 2nd ed., Artech House 2005, section 8.2, has the former.
     """
     width = float(positive("beamwidth_rad", beamwidth_rad))
-    ratio = _ratio(energy_ratio)
+    ratio = _checked_energy_ratio(energy_ratio)
     if method == "monopulse":
-        return _limit_deviation(width, ratio, MONOPULSE_SLOPE)
+        return _limited_variance(width, ratio, MONOPULSE_SLOPE)
     if method == "scan":
-        return _limit_deviation(width, ratio / SCAN_BEAMSHAPE_LOSS, SCAN_SLOPE)
+        return _limited_variance(width, ratio / SCAN_BEAMSHAPE_LOSS, SCAN_SLOPE)
     raise ValueError(f"method is {method!r}: it must be 'monopulse' or 'scan'")
 
 
@@ -57,8 +57,9 @@ def range_variance(range_resolution_m: float, energy_ratio: FloatArray) -> Float
     Skolnik, Theoretical accuracy of radar measurements, IRE Trans. ANE-7, 1960, would be smaller by
     sqrt(3) / pi, which a receiver with weighting does not reach.
     """
-    return _limit_deviation(
-        float(positive("range_resolution_m", range_resolution_m)), _ratio(energy_ratio)
+    return _limited_variance(
+        float(positive("range_resolution_m", range_resolution_m)),
+        _checked_energy_ratio(energy_ratio),
     )
 
 
@@ -69,22 +70,22 @@ def range_rate_variance(range_rate_resolution_m_s: float, energy_ratio: FloatArr
     8.3.
     """
     step = float(positive("range_rate_resolution_m_s", range_rate_resolution_m_s))
-    return _limit_deviation(step, _ratio(energy_ratio))
+    return _limited_variance(step, _checked_energy_ratio(energy_ratio))
 
 
-def _ratio(energy_ratio: FloatArray) -> FloatArray:
+def _checked_energy_ratio(energy_ratio: FloatArray) -> FloatArray:
     ratio: FloatArray = np.asarray(check_not_negative("energy_ratio", energy_ratio))
     return ratio
 
 
-def _limit_deviation(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
+def _limited_variance(width: float, ratio: FloatArray, slope: float = 1.0) -> FloatArray:
     least = 1.0 / (2.0 * slope**2 * _UNIFORM)
     variance: FloatArray = width**2 / (2.0 * slope**2 * np.maximum(ratio, least))
     return variance
 
 
 def signal_over_clutter(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
-    """Return what a look's errors follow from: a pulse's signal over noise and clutter.
+    """Return the ratio of signal to noise and clutter, for measurement errors, as key `snr`.
 
     It is the SNR that the decision rested on and that is recorded: the mean one of a fluctuating
     target, or that of its sampled cross-section. A radar knows it from the height of the echo, to
@@ -94,7 +95,9 @@ def signal_over_clutter(snr: FloatArray, cnr: FloatArray | None) -> dict[str, Fl
 
 
 def signal_variances(p: Any, snr: FloatArray) -> dict[str, FloatArray]:
-    """Return the variances of measured quantities at the SNR of a pulse: rad², m², m²/s²."""
+    """Return the variances of azimuth, elevation (rad²), range (m²) and range rate (m²/s²) at an
+    SNR per pulse.
+    """
     ratio = p.pulses_summed * snr
     variances = {
         angle: angle_variance(math.radians(width_deg), ratio, method=p.angle_measurement)
@@ -110,7 +113,7 @@ def signal_variances(p: Any, snr: FloatArray) -> dict[str, FloatArray]:
 
 
 def check_signal_errors(p: Any) -> None:
-    """Refuse errors by signal of a radar whose beam or resolution is not known."""
+    """Raise ValueError if ``errors = 'signal'`` and a beamwidth or a resolution is missing."""
     if p.errors != "signal":
         return
     wrong = [
@@ -129,11 +132,11 @@ def check_signal_errors(p: Any) -> None:
             "range_rate_resolution_m_s nor the time of a look (dwell_s, or pulses_per_dwell and "
             "prf_hz) is given: errors of range rate are a share of what Doppler resolves"
         )
-    Disagreements.refuse(wrong)
+    Disagreements.raise_if_any(wrong)
 
 
 def _range_rate_resolution_m_s(p: Any) -> float | None:
-    """Return the range rate that Doppler resolves, of its own or by the time of a look."""
+    """Return range rate resolution, given or from the dwell time, m/s; None if unknown."""
     if p.range_rate_resolution_m_s:
         return float(p.range_rate_resolution_m_s)
     look = p.look_energy
@@ -162,7 +165,7 @@ class Strength:
         block = self._block
         extras = {name: v for name, v in look.extras.items() if name != "detection_probability"}
         if look.tail is None:
-            keys = cells.roster.keys_of(cells.target[detected])
+            keys = cells.roster.draw_keys_of(cells.target[detected])
             draws = self._draws.of_runs(cells.run[detected], cells.instant_ns[detected])
             tail = 1.0 - draws.uniform(keys, cells.scan[detected])
         else:
@@ -180,7 +183,7 @@ class Strength:
             for model, chosen in block.models_in_use(cells):
                 some = part
                 if not isinstance(chosen, slice):  # else one model for all
-                    some = part[_is_chosen(detected[part], chosen, len(cells))]
+                    some = part[_positions_of_chosen(detected[part], chosen, len(cells))]
                 output = 1.0 + measured_snr(
                     tail[some],
                     mean[some],
@@ -200,7 +203,7 @@ class Strength:
 
 
 class MeasuredStrength(Effect[Strengthening]):
-    """A target's echo is known as noise is: by how strong it came out.
+    """A detection's SNR and confidence are measured: the output that crossed the threshold.
 
     SNR and confidence of a detection are those of the output that crossed the threshold, by the
     target's own fluctuation and the noise of that look; errors by signal follow from that output
@@ -220,15 +223,15 @@ class MeasuredStrength(Effect[Strengthening]):
         return Verdict(True, "a radar measures strength as it measures places")
 
 
-def _is_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
-    """Return which of some cells are among the chosen ones."""
+def _positions_of_chosen(cells: IntArray, chosen: IntArray, count: int) -> IntArray:
+    """Return the positions in `cells` whose cell is among the chosen ones."""
     inside = np.zeros(count, dtype=bool)
     inside[chosen] = True
     return np.flatnonzero(inside[cells])
 
 
 def noise_report_warnings(parameters: Any) -> list[str]:
-    """Return a warning where noise detections are reported exactly at the target."""
+    """Return a warning in a list if noise in a target's cell is reported exactly at the target."""
     steps = ("azimuth_resolution_deg", "elevation_resolution_deg", "range_resolution_m")
     exact = [step for step in steps if getattr(parameters, step) == 0]
     if parameters.errors != "grid" or not exact:
@@ -240,7 +243,7 @@ def noise_report_warnings(parameters: Any) -> list[str]:
 
 
 class OwnVelocity(Effect[ReportTransform]):
-    """The ownship's velocity over ground beside every detection; navigation has no error of it.
+    """The ownship's ground velocity reported with all detections, without navigation error.
 
     A range rate is of two aircraft: an estimate of the other one's velocity from it needs ours.
     """
@@ -261,7 +264,7 @@ class OwnVelocity(Effect[ReportTransform]):
             after, some = detections.ticks_after, counts > 0
             # At instants of their own, or once a scan.
             row = rows[some] if after is None else np.repeat(rows, counts)
-            state = targets.picture_tick[row]
+            state = targets.position_ticks[row]
             time_s = (state if after is None else state + after) / ticks_per_s
             velocity = _rotate_to_believed_north(
                 own_velocity(targets, row, time_s), targets, row, time_s
@@ -286,5 +289,5 @@ def _rotate_to_believed_north(
     place = believed["lat_deg"][row], believed["lon_deg"][row]
     if not (np.abs(place[0]) > NEAR_A_POLE_DEG).any():
         return velocity
-    own = flights.ownship_states(row, time_s)
+    own = flights.viewer_states(row, time_s)
     return rotate_to_meridian(velocity, (own.lat_deg, own.lon_deg), place)

@@ -12,8 +12,8 @@ from components.radar.detection.probability import detection_probability, requir
 from components.radar.doppler import FEWEST_PULSES, MOST_PULSES
 from components.radar.link_budget import (
     LinkBudget,
+    antenna_gain_from_beam_db,
     calibrated_bandwidth,
-    gain_of_beam_db,
     implausible_value_warnings,
 )
 from components.radar.measurement import check_signal_errors
@@ -24,8 +24,8 @@ from dsa_des.block.component import Parameters
 from dsa_des.errors import Disagreements
 
 
-def dwell_factor(parameters: Any) -> Any:
-    """Return the factor of each cell's SNR: that of the dwell where it is cued."""
+def cued_snr_factor(parameters: Any) -> Any:
+    """Return a function giving cells' SNR factor: the cued dwell factor in cue cones, else 1."""
 
     def factor(cells: Any) -> Any:
         if cells.cued is None:
@@ -135,7 +135,7 @@ class RadarParameters(ResolutionParameters):
     )
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of a filter or a polarisation that is switched off."""
+        """Return a sentence for each key without effect, as the filter or rain is switched off."""
         said, kind = super().ineffective_key_notes(), self.moving_target_filter
         because = f"moving_target_filter is '{kind}'"
         if kind != "filter_bank":
@@ -149,7 +149,7 @@ class RadarParameters(ResolutionParameters):
 
     @model_validator(mode="after")
     def _rate_is_measured(self) -> Self:
-        Disagreements.refuse(
+        Disagreements.raise_if_any(
             f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to true, "
             f"or leave {key} out"
             for key in ("range_rate_resolution_m_s", "range_rate_error_m_s", "range_rate_bias_m_s")
@@ -344,7 +344,7 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
 
     @property
     def stated_pulses_summed(self) -> int:
-        """Pulses summed non-coherently in the look that the link budget describes."""
+        """Pulses summed non-coherently in the look for which the link budget is stated."""
         if self.budget == "dwell" and self.integration == "noncoherent":
             return self.stated_pulses or 1
         return self.pulses
@@ -367,7 +367,7 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
         if self.power_w is None:  # the bandwidth that is calibrated makes up for it
             given["power_w"] = 1.0
         if self.antenna_gain_db is None:
-            given["antenna_gain_db"] = gain_of_beam_db(
+            given["antenna_gain_db"] = antenna_gain_from_beam_db(
                 self.azimuth_beamwidth_deg, self.elevation_beamwidth_deg
             )
         budget = LinkBudget(**{**given, "bandwidth_hz": self.bandwidth_hz or 1.0})
@@ -391,7 +391,7 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
 
 
 def moved_threshold_warnings(p: LinkBudgetParameters) -> list[str]:
-    """Return a sentence with Pd at a calibration's range, where the threshold differs."""
+    """Return a sentence with Pd at the calibration range, if Pfa there is not that in use."""
     known, stated, now = p.calibrate, p.calibrated_pfa, p.false_alarm_probability
     if known is None or stated == now:
         return []

@@ -29,7 +29,7 @@ from components.radar.ground_clutter import (
     CLUTTER,
     Echo,
     GroundClutter,
-    clutter_as_signal,
+    clutter_as_signal_warnings,
     terrain_of,
 )
 from components.radar.link_budget import wavelength
@@ -43,12 +43,12 @@ from components.radar.weather import (
     WEATHER_EFFECTS,
     BlindRange,
     rain_warnings,
-    weather_without_carrier,
+    weather_without_carrier_warnings,
 )
-from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds
-from components.sensor.cued_looks import refuse_cues
-from components.sensor.look import Cells, CellValues, Look, values_of
-from components.sensor.marks import RADAR
+from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds_ascend
+from components.sensor.cued_looks import refuse_if_cued
+from components.sensor.look import Cells, CellValues, Look, effect_values_of_cells
+from components.sensor.palette import RADAR
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -99,11 +99,11 @@ class Radar(SweepingSensor):
         self._merging = self.built_one(ONE_REPORT)
 
     def resolve_echoes(self, cells: Cells, power: FloatArray) -> FloatArray:
-        """Return the power of each echo that the radar can tell from others, and 0 of the rest."""
+        """Return each cell's echo power in its resolution cell; 0 if merged into another."""
         return power if self._merging is None else self._merging(cells, power)
 
-    def seeming_range_m(self, range_m: FloatArray) -> FloatArray:
-        """Return the ranges that echoes seem to come from, where ranges fold."""
+    def apparent_range_m(self, range_m: FloatArray) -> FloatArray:
+        """Return the ranges, m, attributed to echoes from given ranges; different if they fold."""
         seeming: Any = self.built_one(SEEMING_RANGE)
         return range_m if seeming is None else np.asarray(seeming(np.asarray(range_m)))
 
@@ -124,7 +124,7 @@ class Radar(SweepingSensor):
         return replace(reach, lasts_s=LASTS_S + reach.lasts_s)
 
     def offer(self, port: str) -> Any:
-        """Return the sensor's declaration, with whether range rates and ranges are ambiguous."""
+        """Return the sensor's offer, with whether range rates fold and from where ranges do."""
         return replace(
             super().offer(port),
             folds_range_rate=self.p.range_rate_folds,
@@ -132,7 +132,7 @@ class Radar(SweepingSensor):
         )
 
     def exact_because(self) -> str:
-        """A rate divides the change of an error over hundredths of a second by these."""
+        """Return why an exact line of sight is needed (range rates), else an empty string."""
         return f"{self.name} measures range rates" if self._rates else ""
 
     @cached_property
@@ -152,7 +152,9 @@ class Radar(SweepingSensor):
     def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return what is measured, range rates as one PRF takes them where they fold."""
+        """Return measured azimuth, elevation, range and further quantities in body axes, with range
+        rates folded if the radar does.
+        """
         azimuth, elevation, range_m, beside = super()._to_body_axes(values, variances)
         if self.p.range_rate_folds and "range_rate_m_s" in beside:
             assert self.wavelength_m is not None
@@ -168,7 +170,7 @@ class Radar(SweepingSensor):
         targets: RelativeTargets,
         row: IntArray,
     ) -> FloatArray:
-        """Return range rates that noise alone gives, m/s: any that the radar listens for.
+        """Return random range rates of false alarms, m/s, from uniform numbers.
 
         From uniform numbers in [0, 1). A radar of one PRF listens for all that are unambiguous;
         another for those of aircraft up to `FASTEST_M_S` over ground, by its own motion along the
@@ -179,9 +181,9 @@ class Radar(SweepingSensor):
             assert self.wavelength_m is not None
             return off * 0.25 * self.wavelength_m * self.p.prf_hz
         each, index = np.unique(row, return_inverse=True)
-        time_s = targets.picture_tick[each] / self.context.ticks_per_s
+        time_s = targets.position_ticks[each] / self.context.ticks_per_s
         velocity = own_velocity(targets, each, time_s)
-        body = unit_vector(*self.axes.true_direction(where["azimuth"], where["elevation"]))
+        body = unit_vector(*self.axes.true_direction_in_body(where["azimuth"], where["elevation"]))
         attitude = targets.own_attitude
         if attitude is None or not np.isfinite(velocity).all():
             return off * FASTEST_M_S
@@ -204,7 +206,7 @@ class LaterAcquisition(Effect[CellValues]):
         return Verdict(True, f"acquisition has {len(block.p.acquisition)} ranges")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR: 0 of a target not acquired, else 1."""
+        """Return a function giving cells' SNR factor: 1 once the target is acquired, else 0."""
         return Acquired(block.p.acquisition)
 
 
@@ -256,7 +258,7 @@ class RangeBoundaryParameters(RadarParameters):
 
     @model_validator(mode="after")
     def _carrier(self) -> Self:
-        check_speeds(self.acquisition)
+        check_speeds_ascend(self.acquisition)
         for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
             if getattr(self, key) != off and self.frequency_hz is None:
                 raise ValueError(
@@ -269,7 +271,7 @@ class RangeBoundaryParameters(RadarParameters):
 
     @property
     def pulses_summed(self) -> int:
-        """One look."""
+        """Number of pulses summed non-coherently: 1."""
         return 1
 
 
@@ -311,7 +313,7 @@ class RangeBoundary(Radar):
     def setup(self) -> None:
         """Store the scene's effects that change the range of detection."""
         super().setup()
-        refuse_cues(self)
+        refuse_if_cued(self)
 
     def request(self, port: str) -> Any:
         """Return a request for targets in reach, with their motion if speed decides acquisition."""
@@ -324,20 +326,22 @@ class RangeBoundary(Radar):
         """Return warnings where clutter counts as signal, and on which weather has an effect."""
         return [
             *super().warnings(),
-            *clutter_as_signal(self.p, terrain_of(self)),
-            *weather_without_carrier(self),
+            *clutter_as_signal_warnings(self.p, terrain_of(self)),
+            *weather_without_carrier_warnings(self),
             *rain_warnings(self),
         ]
 
     def look(self, cells: Cells) -> Look:
-        """Detect every cell: the gate has kept those out of range away."""
+        """Return which cells are detected, with their margin: all in range whose echo no effect,
+        clutter or merging suppresses.
+        """
         # A metre is closer than any radar sees; it keeps the margin finite at range 0.
         ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
         margin_db = 40.0 * np.log10(ratio)
         detected = np.ones(len(cells), dtype=bool)
         through = np.ones(len(cells))
         for factor in self.snr_factors:
-            through = through * values_of(self, factor, cells)
+            through = through * effect_values_of_cells(self, factor, cells)
         audible = through > 0.0
         lossy = bool((through[audible] != 1.0).any())
         if lossy or self.echoes or not (self.cfar is self.doppler is None):
@@ -351,7 +355,7 @@ class RangeBoundary(Radar):
     def _margin_db(
         self, cells: Cells, over_noise_db: FloatArray, through: FloatArray
     ) -> FloatArray:
-        """Return the margin over what is in the cell, in dB, from that over noise."""
+        """Return each cell's margin over noise and clutter from that over noise, dB."""
         p = self.p
         needed = required_snr(p.boundary_pd, false_alarm_probability=p.false_alarm_probability)
         noise = alone = 10.0 ** (-0.1 * over_noise_db)

@@ -17,7 +17,7 @@ from components.atmosphere.rain_echo import (
     fall_speed_m_s,
     rain_reflectivity_per_m,
     rain_shell_m3,
-    rain_spread_m_s,
+    rain_velocity_deviation_m_s,
     rain_volume_m3,
 )
 from components.geometry import SEMI_MAJOR_AXIS_M
@@ -26,23 +26,27 @@ from components.radar.ground_clutter import (
     Echo,
     NoEcho,
     Velocity,
-    altitude_line_of,
     ground_clutter_rcs_m2,
     ground_ring_rcs_m2,
     height_above_terrain_m,
     platform_spread_m_s,
+    scene_altitude_line_rcs_m2,
     terrain_of,
 )
 from components.radar.pulse_trains.ambiguity import unambiguous_range_m
 from components.radar.resolution import CELL_SIZES, cell_size
 from components.sensor.look import Cells
-from components.sensor.weather_cells import cells_on_lines, cells_verdict, weather_cells
+from components.sensor.weather_cells import (
+    weather_cells,
+    weather_cells_on_sight_lines,
+    weather_cells_verdict,
+)
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
 
 
 class RainClutter(Effect[Echo]):
-    """Echo of rain in the resolution cell of each target, as far as it rains there.
+    """Echo of rain in each target's resolution cell.
 
     In a cell of ``[weather] cells`` it rains as it does there and everywhere together.
 
@@ -60,14 +64,14 @@ class RainClutter(Effect[Echo]):
         because = f"[weather] rain_rate_mm_h is {rate:g}"
         somewhere = Verdict(False, "")
         if any(one.rain_rate_mm_h for one in weather_cells(block)):
-            somewhere = cells_verdict(block)
+            somewhere = weather_cells_verdict(block)
             because = because if rate else somewhere.because
         if (rate or somewhere.simulated) and (why := explain_no_rain_echo(block)):
             return Verdict(False, why)
         return Verdict(rate > 0 or somewhere.simulated, because)
 
     def build(self, block: Any) -> Echo:
-        """Return a function for the rain's RCS in each cell, 0 without rain."""
+        """Return the echo of rain; one of zero power where rain clutter is not simulated."""
         p = block.p
         rain = self.verdict(block).simulated
         if rain and p.pulses_summed > 1 and p.clutter_threshold == "noise":
@@ -79,7 +83,7 @@ class RainClutter(Effect[Echo]):
 
 
 class RainEcho(Echo):
-    """Rain in the beam."""
+    """Echo of the rain in the beam at the target's range."""
 
     def __init__(self, block: Any) -> None:
         super().__init__(block)
@@ -93,9 +97,9 @@ class RainEcho(Echo):
         self._somewhere = any(one.rain_rate_mm_h for one in weather_cells(block))
 
     def rate_mm_h(self, cells: Cells) -> FloatArray:
-        """Return how strongly it rains at each target."""
+        """Return the rain rate at each cell's target, mm/h."""
         rate = np.full(len(cells), float(self.weather.rain_rate_mm_h))
-        for one, within in cells_on_lines(self.block, cells):
+        for one, within in weather_cells_on_sight_lines(self.block, cells):
             rate += np.where(within.leaves >= 1.0, one.rain_rate_mm_h, 0.0)
         return rate
 
@@ -116,10 +120,12 @@ class RainEcho(Echo):
         )
         return np.asarray(per_m * volume_m3)
 
-    def range_rates(
+    def range_rate_mean_and_spread(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Mean by wind, fall and the ownship; spread by both, by shear and by turbulence."""
+        """Return the mean range rate of rain by wind, fall and ownship, and its spread by shear,
+        turbulence and beamwidth, m/s.
+        """
         level = np.cos(cells.elevation_rad)
         sight = (
             level * np.cos(cells.azimuth_rad),
@@ -135,7 +141,7 @@ class RainEcho(Echo):
         # Rounding alone may put a rate beyond the speed that it is part of.
         rate = np.clip(mean, -speed_m_s, speed_m_s)
         platform = platform_spread_m_s(speed_m_s, rate, self.beam_rad[0])
-        own = rain_spread_m_s(cells.range_m, cells.elevation_rad, self.beam_rad[1])
+        own = rain_velocity_deviation_m_s(cells.range_m, cells.elevation_rad, self.beam_rad[1])
         return np.asarray(mean), np.hypot(own, platform)
 
 
@@ -163,12 +169,12 @@ class SidelobeClutter(Effect[Echo]):
         return Verdict(True, f"sidelobe_level_db is {level_db:g}")
 
     def build(self, block: Any) -> Echo:
-        """Return a function for the RCS of clutter in the sidelobes, 0 where there is none."""
+        """Return the echo through the sidelobes; one of zero power where it is not simulated."""
         return SidelobeEcho(block) if self.verdict(block).simulated else NoEcho(block)
 
 
 class SidelobeEcho(Echo):
-    """A ring of ground and a shell of rain, at the level of the sidelobes."""
+    """Echo of ground and rain at the target's range in all directions, at the sidelobes' level."""
 
     def __init__(self, block: Any) -> None:
         super().__init__(block)
@@ -190,7 +196,7 @@ class SidelobeEcho(Echo):
                 gamma_db=self.terrain.clutter_gamma_db, range_resolution_m=step_m,
             )  # fmt: skip
             height_m = height_above_terrain_m(own_alt_m, lowest_m)
-            rcs = rcs + altitude_line_of(self.block, cells.range_m, height_m)
+            rcs = rcs + scene_altitude_line_rcs_m2(self.block, cells.range_m, height_m)
         if self.per_m:
             rcs = rcs + self.per_m * rain_shell_m3(
                 cells.range_m, own_alt_m, range_resolution_m=step_m, lowest_m=lowest_m,
@@ -198,10 +204,10 @@ class SidelobeEcho(Echo):
             )  # fmt: skip
         return self.two_way * rcs
 
-    def range_rates(
+    def range_rate_mean_and_spread(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Around 0, with the deviation that a circle of directions gives the ownship's speed."""
+        """Return mean range rate 0, and the spread of own speed over all directions, m/s."""
         north, east, _ = own_m_s
         return np.zeros(len(cells)), np.sqrt(0.5 * (north * north + east * east))
 
@@ -213,7 +219,8 @@ _FARTHEST_M = math.sqrt(2.0 * SEMI_MAJOR_AXIS_M * 9000.0)
 def ambiguous_ranges_m(
     range_m: FloatArray, fold_m: float, farthest_m: float
 ) -> Iterator[FloatArray]:
-    """Yield the ranges whose echoes arrive with those of some ranges, without these, to a farthest.
+    """Yield, one multiple of the fold at a time, the other ranges up to `farthest_m` whose echoes
+    arrive together with those of `range_m`.
 
     Nearest first; infinite where there is none.
     """
@@ -248,14 +255,14 @@ class FoldedClutter(Effect[Echo]):
         return Verdict(True, f"range_folds is true: clutter of every {every} km beside a target's")
 
     def build(self, block: Any) -> Echo:
-        """Return the function that gives the RCS, at a target's range, of rain at folded ranges."""
+        """Return the echo from other ambiguous ranges; zero power where it is not simulated."""
         if not self.verdict(block).simulated:
             return NoEcho(block)
         return FoldedEcho(block)
 
 
 class FoldedEcho(Echo):
-    """The sum over all other ranges, as if it were at the target's."""
+    """The sum of the clutter at all ambiguous ranges, as RCS at the target's range."""
 
     def __init__(self, block: Any) -> None:
         super().__init__(block)
@@ -274,7 +281,9 @@ class FoldedEcho(Echo):
         return np.asarray(np.sort(each, axis=0)[needed - 1])
 
     def _echo_at_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
-        """Return the folded clutter at one PRF, m², and the range of most of it."""
+        """Return the folded clutter at one PRF as RCS at the target's range (m²), and the range
+        where most of it comes from (m).
+        """
         total, most, where = np.zeros(len(cells)), np.zeros(len(cells)), np.array(cells.range_m)
         for other_m in ambiguous_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
             heard = np.isfinite(other_m) & (other_m >= self._nearest_m)
@@ -303,7 +312,7 @@ class FoldedEcho(Echo):
                     at_m, height_m, gamma_db=self.terrain.clutter_gamma_db,
                     range_resolution_m=self.depth_m,
                 )  # fmt: skip
-                rcs += self._two_way * altitude_line_of(self.block, at_m, height_m)
+                rcs += self._two_way * scene_altitude_line_rcs_m2(self.block, at_m, height_m)
         if self._per_m:
             rcs += self._per_m * rain_volume_m3(
                 at_m, cells.elevation_rad, own_m + at_m * np.sin(cells.elevation_rad),
@@ -313,10 +322,12 @@ class FoldedEcho(Echo):
             )  # fmt: skip
         return rcs
 
-    def range_rates(
+    def range_rate_mean_and_spread(
         self, cells: Cells, own_m_s: Velocity, ground_m_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Those of the ground, or along the beam, at the range that most of it comes from."""
+        """Return mean and spread of the range rate of ground, or of the beam's axis, at the range
+        where most of the clutter comes from, m/s.
+        """
         _, at_m = self._echo_at_prf(cells, self.block.p.prf_hz)
         elevation = cells.elevation_rad
         if self.terrain is not None:
@@ -344,7 +355,7 @@ def explain_no_rain_echo(block: Any) -> str:
 
 
 def rain_reflectivity_of(block: Any, rate_mm_h: ArrayLike) -> Any:
-    """Return the RCS of a volume of rain as a radar receives it, 1/m."""
+    """Return the RCS per volume of rain as the radar receives it, 1/m."""
     per_m = rain_reflectivity_per_m(rate_mm_h, block.wavelength_m)
     if block.p.polarisation == "circular":
         per_m *= 10.0 ** (-0.1 * block.p.rain_rejection_db)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from components.aircraft.aircraft import Aircraft
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.arguments.checks import (
     broadcast_flat,
     check_not_negative,
@@ -29,7 +29,7 @@ from dsa_des.time.randomness import Stream
 
 
 def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> Any:
-    """Return sampled RCS (m²) from uniform draws by the inverse of the distribution's function.
+    """Return random RCS (m²) with the fluctuation of a Swerling model, from uniform numbers.
 
     Of ``swerling1`` and ``swerling3`` there is one draw per scan; of ``swerling2`` and
     ``swerling4`` one per pulse, along the last axis, with which the mean broadcasts before it.
@@ -53,14 +53,14 @@ def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> 
     return unflatten(mean * (0.5 * np.asarray(gammaincinv(2.0, draw))), shape)
 
 
-def scan_rcs(
+def sampled_scan_rcs_m2(
     mean_rcs_m2: FloatArray,
     draw: Callable[[int], FloatArray],
     *,
     pulses: int,
     model: str,
 ) -> FloatArray:
-    """Return the RCS that a scan's pulses show on average, sampled, m².
+    """Return the mean RCS of a scan's pulses, drawn at random by the Swerling model, m².
 
     One draw per scan for ``swerling1`` and ``swerling3``; one per pulse for ``swerling2`` and
     ``swerling4``, whose RCS are averaged (thesis §4.1.2). `draw` gives uniform numbers in [0, 1) by
@@ -81,7 +81,7 @@ def scan_rcs(
 
 
 def _aspect_angles(cells: Cells) -> tuple[FloatArray, FloatArray]:
-    """Return from where each cell's target is seen, in its body axes."""
+    """Return azimuth and elevation of the radar as seen in each target's body axes, rad."""
     # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
     # heading.
     *turned, elevation = aspect_angles_of_cells(cells)
@@ -103,7 +103,7 @@ def mean_rcs_m2(cells: Cells) -> FloatArray:
 
 
 class ModelsOfCells(Protocol):
-    """Tells which Swerling model each cell has."""
+    """Function that returns the Swerling model of each cell."""
 
     def __call__(self, cells: Cells, /) -> list[tuple[int, Any]]:
         """Return models (5 written as 0) with the cells that each holds for."""
@@ -116,8 +116,10 @@ MEAN_RCS = Hook("mean RCS", CellValues, "each cell's mean RCS in m²")
 def _verdict_by_targets(
     context: Context, says: Callable[[Aircraft], str], *, otherwise: str
 ) -> Verdict:
-    """Return the verdict on an effect that targets call for by what one `says` they have."""
-    rosters = known_targets(context)
+    """Return the verdict that an effect is needed if `says` returns a text for any known target, or
+    if none is known.
+    """
+    rosters = offered_rosters(context)
     if not rosters:
         return Verdict(True, "the targets are not known before the run")
     calling = [
@@ -149,8 +151,8 @@ class RcsFluctuation(Effect[ModelsOfCells]):
         )
 
     def build(self, block: Any) -> ModelsOfCells:
-        """Return a function for each cell's fluctuation model."""
-        return models_of(block.p.swerling)
+        """Return a function giving cells' Swerling models, each with the cells it applies to."""
+        return fluctuation_models_by_cell(block.p.swerling)
 
 
 class AspectRcs(Effect[CellValues]):
@@ -170,14 +172,14 @@ class AspectRcs(Effect[CellValues]):
         )
 
     def build(self, block: Any) -> CellValues:
-        """Return each cell's mean RCS; one of a target without a table, or where tables are not
-        asked for, is its constant.
+        """Return a function that gives each cell's mean RCS: from a table over aspect if tables are
+        used, else a constant, m².
         """
         return mean_rcs_m2 if block.p.aspect_rcs else constant_rcs_m2
 
 
-def models_of(swerling: int | None) -> ModelsOfCells:
-    """Return what tells each cell's fluctuation model: one for all, or each target its own.
+def fluctuation_models_by_cell(swerling: int | None) -> ModelsOfCells:
+    """Return a function giving cells' Swerling models: one for all, or each target's own.
 
     It gives pairs of a model (5 written as 0) and the cells that it holds for.
     """
@@ -195,13 +197,13 @@ def models_of(swerling: int | None) -> ModelsOfCells:
     return models
 
 
-def steady(cells: Cells) -> list[tuple[int, Any]]:
-    """Return the fluctuation model of cells that are all steady."""
+def steady_models(cells: Cells) -> list[tuple[int, Any]]:
+    """Return model 0 (steady) for all cells."""
     return [(0, slice(None))]
 
 
 def constant_rcs_m2(cells: Cells) -> FloatArray:
-    """Return each cell's RCS where no target has a table, m²."""
+    """Return the constant RCS of each cell's target, m²."""
     rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
     return rcs
 
@@ -214,7 +216,7 @@ FIXED, CHANGING = 48, 8
 
 
 class Scatterers:
-    """Scatterers at fixed places of each target's body, evenly spread over a ball of `extent_m`.
+    """Random scatterers fixed in each target's body, uniform in a ball of `extent_m`.
 
     An echo that goes to a scatterer at r and back has the phase 4π r·u / λ for the direction u to
     the radar. The sum of many with complex Gaussian strengths is a complex Gaussian amplitude; over
@@ -230,7 +232,7 @@ class Scatterers:
         self._stream, self._count = stream, count
         self._reach = 2.0 * math.pi * extent_m / wavelength_m
 
-    def echo(
+    def echo_amplitudes(
         self,
         keys: Any,
         aspect: tuple[FloatArray, FloatArray, FloatArray],
@@ -252,7 +254,7 @@ class Scatterers:
         real, imaginary = np.zeros(len(keys)), np.zeros(len(keys))
         for number in range(which * self._count, (which + 1) * self._count):
             numbers = np.full(len(targets), number, dtype=np.int64)
-            position = self._places(stream, targets, numbers)
+            position = self._scatterer_positions(stream, targets, numbers)
             # One after the other, so that an element's sum has one order in any array.
             phase = np.zeros(len(keys))
             for along, component in zip(position, aspect, strict=True):
@@ -268,8 +270,10 @@ class Scatterers:
         scale = 1.0 / math.sqrt(self._count)
         return scale * real, scale * imaginary
 
-    def _places(self, stream: Stream, targets: Any, numbers: IntArray) -> list[FloatArray]:
-        """Return where a scatterer is along each axis, as phase per unit of aspect."""
+    def _scatterer_positions(
+        self, stream: Stream, targets: Any, numbers: IntArray
+    ) -> list[FloatArray]:
+        """Return a scatterer's coordinates by body axis, as phase per unit of aspect vector."""
         # One draw number is two uniforms (`Stream.uniform`), so 0 and 1 are the first of them.
         out, up, around = (stream.uniform(targets, numbers, draw) for draw in (0, 1, 2))
         radius = self._reach * np.cbrt(out)
@@ -346,7 +350,7 @@ class LastingFluctuation(Effect[Fading]):
         return Verdict(True, "; ".join(said))
 
     def build(self, block: Any) -> Fading:
-        """Return each echo's power over its mean, at the instant of its look."""
+        """Return a function giving each echo's power over its mean at its look's instant."""
         lasts_s, extent_m = block.p.fluctuation_correlation_s, block.p.scintillation_extent_m
         process = None if lasts_s is None else GaussMarkov(block.stream("fading"), lasts_s)
         scatterers = None
@@ -359,7 +363,7 @@ class LastingFluctuation(Effect[Fading]):
             )
 
         def fading(cells: Cells, chosen: Any, model: int) -> FloatArray:
-            keys = cells.roster.keys_of(cells.target)[chosen]
+            keys = cells.roster.draw_keys_of(cells.target)[chosen]
             instant_ns, run = cells.instant_ns[chosen], cells.run[chosen]
 
             def pair(number: int) -> tuple[FloatArray, FloatArray]:
@@ -374,15 +378,15 @@ class LastingFluctuation(Effect[Fading]):
                 if scatterers is None:
                     amplitudes += pair(which)
                     continue
-                aspect = _aspect(cells, chosen)
+                aspect = _aspect_vectors(cells, chosen)
                 strengths = None if process is None else pair
-                amplitudes += scatterers.echo(keys, aspect, which, strengths, run)
+                amplitudes += scatterers.echo_amplitudes(keys, aspect, which, strengths, run)
             return fading_power(amplitudes)
 
         return fading
 
 
-def _aspect(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+def _aspect_vectors(cells: Cells, chosen: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return the unit vector from each target to the radar in the target's body axes."""
     azimuth, elevation = _aspect_angles(cells)
     x, y, z = unit_vector(azimuth[chosen], elevation[chosen])

@@ -44,7 +44,7 @@ class ResolutionCells:
 
     @classmethod
     def from_reach(cls, reach: Reach, nearest_m: float, cell: tuple[float, float, float]) -> Self:
-        """Return the grid of cells (rad, rad, m) of a reach, or refuse over 1e15 of them."""
+        """Return a reach's grid of cells of size `cell` (rad, rad, m); ValueError above 1e15."""
         firsts = reach.azimuth_rad[0], reach.elevation_rad[0], nearest_m
         widths = *reach.width_rad, reach.range_max_m - nearest_m
         azimuth, elevation, depth = map(steps_across, widths, cell)
@@ -105,14 +105,14 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
 
     @property
     def reports_by_cell(self) -> bool:
-        """Return whether targets in one resolution cell give one report."""
+        """Whether targets in the same resolution cell give one report."""
         if self.resolution_cells is None:
             return self.errors != "grid" and not self.sizeless_steps
         return self.resolution_cells
 
     @property
     def sizeless_steps(self) -> list[str]:
-        """Return the names of grid steps that are 0 and have no beamwidth beside them."""
+        """Names of the grid steps that are 0 and have no beamwidth instead."""
         return [
             step
             for beam, step in CELL_SIZES
@@ -130,7 +130,7 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
 
     @model_validator(mode="after")
     def _cells_have_a_size(self) -> Self:
-        Disagreements.refuse(
+        Disagreements.raise_if_any(
             f"{step} is 0 and resolution_cells is true: a cell has a size, it must be above 0"
             for step in (self.sizeless_steps if self.resolution_cells else ())
         )
@@ -138,7 +138,7 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
 
 
 def cell_size(parameters: Any) -> tuple[float, float, float]:
-    """Return the size of a resolution cell (rad, rad, m): its beam, or its grid's step, or 0."""
+    """Return a cell's azimuth, elevation (rad), range (m): the beamwidth, else the grid step."""
     widths = [
         getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in CELL_SIZES
     ]
@@ -184,7 +184,7 @@ class Merging:
         cell = [
             np.rint(values / width)
             for values, width in zip(
-                (*seen, block.seeming_range_m(cells.range_m)), self._widths, strict=True
+                (*seen, block.apparent_range_m(cells.range_m)), self._widths, strict=True
             )
         ]
         # Astern the last cell is the first one.
@@ -242,7 +242,7 @@ class OneReportByCell(Effect[Merging]):
 
 
 class SeemingRange(Protocol):
-    """Gives the ranges that echoes seem to come from."""
+    """Function that returns the ranges that the radar attributes to echoes."""
 
     def __call__(self, range_m: FloatArray, /) -> FloatArray:
         """Return the folded ranges of true ranges, m."""
@@ -280,7 +280,7 @@ class RangeFolding(Effect[SeemingRange]):
             return lambda range_m: range_m
 
         def seeming(range_m: FloatArray) -> FloatArray:
-            shares = p.shares(range_m)
+            shares = p.received_shares(range_m)
             return coincident_range_m(
                 range_m,
                 prfs_hz=p.prfs_hz,

@@ -21,14 +21,14 @@ from components.radar.rcs import (
     LastingFluctuation,
     ModelsOfCells,
     RcsFluctuation,
-    models_of,
-    scan_rcs,
-    steady,
+    fluctuation_models_by_cell,
+    sampled_scan_rcs_m2,
+    steady_models,
 )
 from components.radar.threshold_radar import LinkBudgetRadar
 from components.radar.weather import WEATHER_EFFECTS
 from components.sensor.cued_looks import CUE
-from components.sensor.look import Cells, Look, values_of
+from components.sensor.look import Cells, Look, effect_values_of_cells
 from dsa_des.arrays.types import FloatArray
 from dsa_des.time.gauss_markov import LONGEST_S
 
@@ -140,7 +140,7 @@ class SwerlingParameters(LinkBudgetParameters):
 
     @property
     def samples_rcs(self) -> bool:
-        """Return whether an RCS is drawn for each look, and Pd is that of a steady target."""
+        """Whether an RCS is drawn for each look, so that Pd is that of a steady target."""
         lasting = (self.fluctuation_correlation_s, self.scintillation_extent_m)
         return self.fluctuation == "sampled" or any(given is not None for given in lasting)
 
@@ -167,7 +167,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         # Until the scene's effects are known, as the targets' own models call for.
-        self._models: ModelsOfCells = models_of(parameters.swerling)
+        self._models: ModelsOfCells = fluctuation_models_by_cell(parameters.swerling)
         self._method: str = parameters.detection
         self._draws = self.stream("detection")
         self._rcs_draws = self.stream("rcs")
@@ -177,7 +177,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def setup(self) -> None:
         """Store the scene's effects; without fluctuation every target is steady."""
         super().setup()
-        self._models = self.built_one(FLUCTUATION) or steady
+        self._models = self.built_one(FLUCTUATION) or steady_models
         self._fading = self.built_one(FADING)
         if self.p.detection == "exact":
             self._method = self.built_one(PD_METHOD) or "table"
@@ -188,11 +188,11 @@ class SwerlingRadar(LinkBudgetRadar):
         return said if self.p.model is None else [*said, *method_reasons(self, self._method)]
 
     def warnings(self) -> list[str]:
-        """Return the radar's warnings, and one where scans follow faster than fades end."""
-        return [*super().warnings(), *_fades_drawn_too_often(self)]
+        """Return the warnings, with one if scans draw fades more often than they change."""
+        return [*super().warnings(), *_fade_rate_warnings(self)]
 
     def range_slack(self) -> float:
-        """Return the relative error of range whose change of Pd ``[accuracy]`` still allows.
+        """Return the relative range error that changes Pd by no more than ``[accuracy]`` allows.
 
         SNR goes with the fourth power of range, and Pd changes by max |dPd / d ln SNR| per unit
         of ln SNR at most. Nothing is proven where more than that depends on the line of sight.
@@ -200,7 +200,7 @@ class SwerlingRadar(LinkBudgetRadar):
         allowed = self.context.tolerance.get("detection_probability")
         if allowed is None:
             return math.inf
-        steepness = self.steepest_pd()
+        steepness = self.largest_pd_slope()
         others = {
             "aspect RCS",
             "beam shape",
@@ -217,17 +217,17 @@ class SwerlingRadar(LinkBudgetRadar):
         return share / (1.0 + share)
 
     def false_alarm_zero_db(self) -> float:
-        """Return the SNR that the radar's own model needs for `reference_pd`; steady if none."""
-        return self._reference((self.p.swerling or 0) % 5)
+        """Return the SNR in dB at which Pd is `reference_pd`; confidence is counted from it."""
+        return self._snr_at_reference_pd_db((self.p.swerling or 0) % 5)
 
     def look(self, cells: Cells) -> Look:
-        """Draw every cell against its probability of detection; where no echo comes that is 0."""
-        snr, clutter = self.received(cells)
+        """Draw for each cell whether the target is detected by its probability of detection."""
+        snr, clutter = self.received_snr_and_clutter(cells)
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, np.nan))
         confidence = np.empty(len(cells))
         for model, chosen in self.models_in_use(cells):
-            confidence[chosen] = snr_db[chosen] - self._reference(model)
+            confidence[chosen] = snr_db[chosen] - self._snr_at_reference_pd_db(model)
         pd = np.where(echo, self._pd_of_cells(cells, snr, clutter), 0.0)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
@@ -243,7 +243,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def _target_detection_probability(
         self, cells: Cells, pd: FloatArray, clutter: Clutter | None
     ) -> FloatArray:
-        """Return the probability that the target is detected where noise alone is not.
+        """Return the probability that the target is detected in addition to noise alone.
 
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
         """
@@ -253,29 +253,29 @@ class SwerlingRadar(LinkBudgetRadar):
         return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
     def snr(self, cells: Cells) -> FloatArray:
-        """Return each cell's SNR: the mean one, or that of the scan's sampled RCS."""
-        if not self.p.samples_rcs or self._models is steady:
+        """Return each cell's SNR (linear), for the mean RCS or for the RCS drawn for the scan."""
+        if not self.p.samples_rcs or self._models is steady_models:
             return super().snr(cells)
-        rcs = values_of(self, self.mean_rcs_m2, cells)
-        keys = cells.roster.keys_of(cells.target)
+        rcs = effect_values_of_cells(self, self.mean_rcs_m2, cells)
+        keys = cells.roster.draw_keys_of(cells.target)
         for model, chosen in self._models(cells):
-            if self._fading is not None and self._is_lasting(model):
+            if self._fading is not None and self._is_constant_over_look(model):
                 rcs[chosen] = rcs[chosen] * self._fading(cells, chosen, model)
                 continue
             draws = self._rcs_draws.of_runs(cells.run[chosen], cells.instant_ns[chosen])
             draw = partial(draws.uniform, keys[chosen], cells.scan[chosen])
-            rcs[chosen] = scan_rcs(
+            rcs[chosen] = sampled_scan_rcs_m2(
                 rcs[chosen], draw, pulses=self.p.pulses_summed, model=f"swerling{model}"
             )
         return self.echo_snr(cells, rcs)
 
-    def _is_lasting(self, model: int) -> bool:
-        """Return whether a model's fluctuation lasts over a look: not where its pulses differ."""
+    def _is_constant_over_look(self, model: int) -> bool:
+        """Return whether a model's RCS stays the same over all pulses of a look."""
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
     @property
     def _cued_detector(self) -> tuple[int, float] | None:
-        """Pulses and false alarm probability in cue cones; None where all is as usual."""
+        """Pulses and probability of false alarm inside cue cones; None if the usual ones."""
         p = self.p
         if not (p.cued_pulses or p.cued_false_alarm_probability):
             return None
@@ -285,20 +285,22 @@ class SwerlingRadar(LinkBudgetRadar):
         )
 
     def _pd_of_cells(self, cells: Cells, snr: FloatArray, clutter: Clutter | None) -> FloatArray:
-        """Return the probability of detection of every cell."""
+        """Return the probability of detection of each cell, with clutter if there is any."""
         pd = np.empty(len(cells))
         cued = None if cells.cued is None else self._cued_detector
         usual = self.p.pulses_summed, self.p.false_alarm_probability
         for model, chosen in self.models_in_use(cells):
             beside = None if clutter is None else clutter.take(chosen)
-            of_model = self._pd(snr[chosen], model, beside, *usual)
+            of_model = self._pd_of_model(snr[chosen], model, beside, *usual)
             if cued is not None:
                 inside = cells.is_cued()[chosen]
-                of_model = np.where(inside, self._pd(snr[chosen], model, beside, *cued), of_model)
+                of_model = np.where(
+                    inside, self._pd_of_model(snr[chosen], model, beside, *cued), of_model
+                )
             pd[chosen] = of_model
         return pd
 
-    def _pd(
+    def _pd_of_model(
         self,
         snr: FloatArray,
         model: int,
@@ -306,7 +308,7 @@ class SwerlingRadar(LinkBudgetRadar):
         pulses: int,
         false_alarm_probability: float,
     ) -> FloatArray:
-        """Return Pd of one model's cells; where there is clutter, of the echo within it."""
+        """Return the Pd for one fluctuation model, with clutter if there is any."""
         p, name = self.p, f"swerling{model}"
         kind = "" if clutter is None else self.context.sections["terrain"].clutter_mean
         mean, diffuse = np.zeros(0), np.zeros(0)
@@ -335,8 +337,8 @@ class SwerlingRadar(LinkBudgetRadar):
         )
         return pd
 
-    def steepest_pd(self) -> float | None:
-        """Return the largest |dPd / d ln SNR| of any fluctuation model, from a fine grid.
+    def largest_pd_slope(self) -> float | None:
+        """Return the largest |dPd / d ln SNR| of any fluctuation model; None if unknown.
 
         None where there is ground clutter, which the same loss takes as well, with CFAR, and with a
         moving-target filter.
@@ -346,23 +348,23 @@ class SwerlingRadar(LinkBudgetRadar):
         proven = self.p.cfar_reference_cells is None and self.p.moving_target_filter == "none"
         if terrain_of(self) is not None or not proven:
             return None
-        return _steepest_pd(self.p.pulses_summed, self.p.false_alarm_probability)
+        return _largest_pd_slope(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
-        """Return each model whose Pd decides with its cells: a sampled RCS is a steady target."""
+        """Return pairs of Pd's Swerling model and its cells; 0 for all if the RCS is drawn."""
         if self.p.samples_rcs:
             return [(0, slice(None))]
         return self._models(cells)
 
     def cued_crossing(self) -> Crossing | None:
-        """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
+        """Return the threshold of a look inside a cue cone; None if it is the same as elsewhere."""
         return (
             None
             if self._cued_detector is None
             else Crossing.from_false_alarms(*self._cued_detector)
         )
 
-    def _reference(self, model: int) -> float:
+    def _snr_at_reference_pd_db(self, model: int) -> float:
         if model not in self._reference_db:
             pd, name = self.p.reference_pd, f"swerling{model}"
             self._reference_db[model] = (
@@ -374,7 +376,7 @@ class SwerlingRadar(LinkBudgetRadar):
 
 
 @lru_cache(maxsize=16)
-def _steepest_pd(pulses: int, false_alarm_probability: float) -> float:
+def _largest_pd_slope(pulses: int, false_alarm_probability: float) -> float:
     """Return the largest |dPd / d ln SNR| of any fluctuation model."""
     log_snr = np.linspace(math.log(1e-8), math.log(1e8), 40_001)
     steepest = 0.0
@@ -394,7 +396,7 @@ def _steepest_pd(pulses: int, false_alarm_probability: float) -> float:
 _EXTENT_M, _TURNS_RAD_S = 10.0, math.radians(0.2)
 
 
-def _fades_drawn_too_often(block: Any) -> list[str]:
+def _fade_rate_warnings(block: Any) -> list[str]:
     """Return a warning where scans draw new fades before the last fade can have ended."""
     effects, p = block.context.effects, block.p
     if not p.enabled or RcsFluctuation.name not in effects or LastingFluctuation.name in effects:

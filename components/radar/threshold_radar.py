@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from components.aircraft.aircraft import Roster
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.messages.detections import Detections
 from components.messages.false_detections import add_false_detections
 from components.messages.targets import RelativeTargets
@@ -27,14 +27,14 @@ from components.radar.false_alarms import (
 from components.radar.ground_clutter import (
     Clutter,
     GroundClutter,
-    clutter_as_signal,
+    clutter_as_signal_warnings,
     terrain_of,
 )
 from components.radar.link_budget import beam_gain_warnings, implausible_value_warnings
 from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
 from components.radar.parameters import (
     LinkBudgetParameters,
-    dwell_factor,
+    cued_snr_factor,
     moved_threshold_warnings,
 )
 from components.radar.radar import Radar
@@ -52,7 +52,7 @@ from components.radar.weather import (
     rain_warnings,
 )
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
-from components.sensor.look import Cells, CellValues, Look, values_of
+from components.sensor.look import Cells, CellValues, Look, effect_values_of_cells
 from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook
@@ -126,16 +126,16 @@ class LinkBudgetRadar(Radar):
         self._beam_shape = self.built_one(BEAM_SHAPE)
         self._propagation = self.built_one(PROPAGATION)
         if self.built(CUE) and self.p.cued_dwell_factor is not None:
-            self.snr_factors = [*self.snr_factors, dwell_factor(self.p)]
+            self.snr_factors = [*self.snr_factors, cued_snr_factor(self.p)]
         self._set_threshold()
         if noise := self.context.effects.get(FalseAlarms.name):
             noise.refuse_too_many()
 
     def _set_threshold(self) -> None:
-        """Set the threshold after the scene's effects, where it is not known before."""
+        """Set the threshold once the scene's effects are known; by default do nothing."""
 
     def _far_field_link_budget(self) -> Any:
-        """Return the link budget that ends where the antenna's far field does."""
+        """Return the link budget with far-field minimum range, or the present one if nearer."""
         far_field = replace(self.budget, minimum_range_m=None)
         # A minimum range inside the near field is the scene's word that there are echoes.
         return far_field if far_field.nearest_m < self.budget.nearest_m else self.budget
@@ -149,8 +149,8 @@ class LinkBudgetRadar(Radar):
         return super().run(wake)
 
     def _check_offered(self, roster: Roster) -> None:
-        """Refuse targets that the effects' verdicts have not seen."""
-        known = known_targets(self.context)
+        """Raise ValueError if the roster differs from those that were offered before the run."""
+        known = offered_rosters(self.context)
         if known and not any(roster.names == other.names for other in known):
             raise ValueError(
                 "these targets were not offered before the run, and others were: a traffic block "
@@ -159,22 +159,22 @@ class LinkBudgetRadar(Radar):
 
     def snr(self, cells: Cells) -> FloatArray:
         """Return each cell's mean SNR (linear), 0 closer than the minimum range (eq. 7-8)."""
-        snr = self.echo_snr(cells, values_of(self, self.mean_rcs_m2, cells))
+        snr = self.echo_snr(cells, effect_values_of_cells(self, self.mean_rcs_m2, cells))
         return snr if self._propagation is None else snr * self._propagation(cells)
 
     def echo_snr(self, cells: Cells, rcs_m2: FloatArray) -> FloatArray:
         """Return each cell's SNR for the given cross-sections, with all losses on the way."""
         snr = self._echo_budget.snr_of_cells(cells.range_m, rcs_m2)
         for factor in self.snr_factors:
-            snr = snr * values_of(self, factor, cells)
+            snr = snr * effect_values_of_cells(self, factor, cells)
         return snr
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances that follow from the ratio of signal to noise and clutter."""
         return signal_variances(self.p, signal["snr"])
 
-    def received(self, cells: Cells) -> tuple[FloatArray, Clutter | None]:
-        """Return the SNR of each echo that stands for its cell, and the clutter if there is any.
+    def received_snr_and_clutter(self, cells: Cells) -> tuple[FloatArray, Clutter | None]:
+        """Return cells' SNR after Doppler filter and merging, and the clutter or None.
 
         Both as the detector has them: behind a moving-target filter, where there is one.
         """
@@ -187,15 +187,15 @@ class LinkBudgetRadar(Radar):
 
     @property
     def crossing(self) -> Crossing:
-        """Return the rule by which outputs of targets and of noise cross the threshold."""
+        """Threshold of a look outside cue cones, with its probability of false alarm."""
         return Crossing.from_false_alarms(self.p.pulses_summed, self.p.false_alarm_probability)
 
     def cued_crossing(self) -> Crossing | None:
-        """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
+        """Return the threshold of a look inside a cue cone; None if it is the same as elsewhere."""
         return None
 
     def crossings_of(self, cells: Cells, detected: IntArray) -> list[tuple[Crossing, IntArray]]:
-        """Return the thresholds that some cells cross, each with which of them."""
+        """Return pairs of a threshold and the positions of the detected cells it applies to."""
         cued = self.cued_crossing()
         if cued is None or cells.cued is None:
             return [(self.crossing, np.arange(len(detected)))]
@@ -203,7 +203,7 @@ class LinkBudgetRadar(Radar):
         return [(cued, np.flatnonzero(inside)), (self.crossing, np.flatnonzero(~inside))]
 
     def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
-        """Return each fluctuation model with its cells: one that decides by the mean is steady."""
+        """Return pairs of Pd's Swerling model and its cells; here model 0 (steady) for all."""
         return [(0, slice(None))]
 
     def false_alarm_zero_db(self) -> float:
@@ -223,7 +223,7 @@ class LinkBudgetRadar(Radar):
         rate: FloatArray,
         cued: bool | None = None,
     ) -> Detections:
-        """Return detections with reports of noise added at the cells of `row`.
+        """Return the detections with false reports by noise added in the given rows.
 
         They are given by ascending row of the report, position by quantity in the sensor's axes,
         key of their draws, how strong they came out (linear, above 0), and a uniform number that
@@ -235,7 +235,7 @@ class LinkBudgetRadar(Radar):
             where = {**where, "range_rate": range_rate}
         scan, tick, run = detections.scan[row], detections.tick[row], detections.run[row]
         instant_ns = nanosecond_of(tick, self.context.ticks_per_s)
-        azimuth, elevation, range_m, measured = self.report_noise(
+        azimuth, elevation, range_m, measured = self.report_false_alarms(
             where, {"snr": snr}, (key, scan, instant_ns, run)
         )
         snr_db = 10.0 * np.log10(snr)
@@ -260,12 +260,12 @@ class LinkBudgetRadar(Radar):
         """Return the key that sets the probability of false alarm, and its value."""
         return f"false_alarm_probability is {self.p.false_alarm_probability:g}"
 
-    def steepest_pd(self) -> float | None:
+    def largest_pd_slope(self) -> float | None:
         """Return the largest |dPd / d ln SNR| of any target, or None where Pd jumps."""
         return None
 
     def required_snr_db(self, pd: float, model: str) -> float:
-        """Return the mean SNR in dB at which the probability of detection is `pd`."""
+        """Return the mean SNR per pulse in dB at which the probability of detection is `pd`."""
         snr = required_snr(
             pd,
             pulses=self.p.pulses_summed,
@@ -295,7 +295,7 @@ class LinkBudgetRadar(Radar):
             *cue_warnings(self),
             *moved_threshold_warnings(self.p),
             *false_alarm_count_warnings(self),
-            *clutter_as_signal(self.p, terrain_of(self)),
+            *clutter_as_signal_warnings(self.p, terrain_of(self)),
             *beam_gain_warnings(self.p),
             *rain_warnings(self),
             *gas_left_out_notes(self),
@@ -332,7 +332,7 @@ class ThresholdRadar(LinkBudgetRadar):
             self.threshold_db = self.required_snr_db(*self._stated_for)
 
     def _set_threshold(self) -> None:
-        """Raise a threshold from reference cells by its loss."""
+        """Raise the threshold by the CFAR loss, and set the threshold for cue cones."""
         if self.cfar is not None:
             self.threshold_db += self.cfar.loss_db(*self._stated_for)
         self.cued_threshold_db = self.threshold_db
@@ -343,11 +343,11 @@ class ThresholdRadar(LinkBudgetRadar):
 
     @property
     def crossing(self) -> Crossing:
-        """Return the rule by which noise crosses the threshold that is set for targets."""
+        """Threshold of a look outside cue cones, by ``threshold_db``, with the Pfa it implies."""
         return Crossing.from_snr(self.p.pulses_summed, self.threshold_db)
 
     def cued_crossing(self) -> Crossing | None:
-        """Return how a look within a cue cone crosses its threshold; None where as elsewhere."""
+        """Return the threshold of a look inside a cue cone; None if it is the same as elsewhere."""
         if self.cued_threshold_db == self.threshold_db:
             return None
         return Crossing.from_snr(self.p.pulses_summed, self.cued_threshold_db)
@@ -358,12 +358,12 @@ class ThresholdRadar(LinkBudgetRadar):
         return f"threshold_db{given} is {self.threshold_db:g}"
 
     def false_alarm_zero_db(self) -> float:
-        """Return the threshold."""
+        """Return the threshold in dB, from which the confidence of a false alarm is counted."""
         return self.threshold_db
 
     def look(self, cells: Cells) -> Look:
-        """Compare every cell's SNR with the threshold."""
-        snr, clutter = self.received(cells)
+        """Return which cells' SNR reaches the threshold, with their margin."""
+        snr, clutter = self.received_snr_and_clutter(cells)
         cnr = None if clutter is None else clutter.total
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, np.nan))

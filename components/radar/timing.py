@@ -30,7 +30,7 @@ class BeamPositions(NamedTuple):
         return self.azimuth * self.elevation
 
 
-def pulses_in(dwell_s: float, prf_hz: float) -> int:
+def whole_pulses_in_dwell(dwell_s: float, prf_hz: float) -> int:
     """Return the number of whole pulse intervals in a dwell, 0 or more."""
     return math.floor(dwell_s * prf_hz * (1.0 + _ROUNDING))
 
@@ -42,7 +42,7 @@ def check_unambiguous(prf_hz: float, range_km: float) -> None:
         highest_hz = 1.0 / round_trip_s(range_km * 1000.0)
         raise ValueError(
             f"prf_hz is {prf_hz:g}: echoes are unambiguous up to {reach_m / 1000:.4g} km "
-            f"and range_km is {range_km:g}; it must be at most {_format_limit(highest_hz)}"
+            f"and range_km is {range_km:g}; it must be at most {_format_rounded_down(highest_hz)}"
         )
 
 
@@ -74,7 +74,7 @@ class LookEnergy:
 
 
 class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
-    """Parameters of what a radar's scan costs in time."""
+    """Parameters of how a radar's scan time is divided among its beams."""
 
     budget: Literal["free", "dwell"] | None = Field(
         default=None,
@@ -156,28 +156,28 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
         return BeamPositions(*(steps_across(width, self.beam_spacing * one) for width, one in axes))
 
     def _dwell_s(self, beams: BeamPositions) -> float:
-        """Return the time for each beam where a scan looks at every one once, s."""
+        """Return the dwell time on each beam position if a scan visits each once, s."""
         return 1.0 / (float(self.scan_rate_hz) * beams.number)
 
     @property
     def stated_dwell_s(self) -> float | None:
-        """Time on one beam of the look that the link budget describes, s; None if not stated."""
+        """Dwell time of the look for which the link budget is stated, s; None if not stated."""
         if self.pulses_per_dwell is not None and self.prf_hz is not None:
             return self.pulses_per_dwell / self.prf_hz
         return self.dwell_s
 
     @property
     def stated_pulses(self) -> int | None:
-        """Pulses of the look that the link budget describes; None if they are not known."""
+        """Number of pulses in the look for which the link budget is stated; None if not known."""
         if self.pulses_per_dwell is not None or self.prf_hz is None:
             return self.pulses_per_dwell
         if self.dwell_s is not None:
-            return pulses_in(self.dwell_s, self.prf_hz)
+            return whole_pulses_in_dwell(self.dwell_s, self.prf_hz)
         return 1 if self.budget == "dwell" else None
 
     @property
     def look_energy(self) -> LookEnergy | None:
-        """Return the pulses of a look with ``budget = "dwell"``; None where the scan is free."""
+        """Beams, dwell time and pulses of a look with ``budget = 'dwell'``; else None."""
         beams = self.beams
         if self.budget != "dwell" or beams is None:
             return None
@@ -185,7 +185,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
         dwell_s = self._dwell_s(beams) / (1 + len(self.other_prfs_hz))
         if self.prf_hz is None or self.stated_pulses is None:
             return LookEnergy(beams, dwell_s, None, dwell_s / (self.dwell_s or dwell_s), 1)
-        pulses = pulses_in(dwell_s, self.prf_hz)
+        pulses = whole_pulses_in_dwell(dwell_s, self.prf_hz)
         if self.integration == "noncoherent":
             return LookEnergy(beams, dwell_s, pulses, 1.0, pulses)
         return LookEnergy(beams, dwell_s, pulses, pulses / self.stated_pulses, 1)
@@ -195,7 +195,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
             return
         if self.range_km is not None and not self.range_folds:
             check_unambiguous(self.prf_hz, self.range_km)
-        if self.dwell_s is not None and pulses_in(self.dwell_s, self.prf_hz) < 1:
+        if self.dwell_s is not None and whole_pulses_in_dwell(self.dwell_s, self.prf_hz) < 1:
             raise ValueError(
                 f"dwell_s is {self.dwell_s:g}: it must hold a pulse, so with prf_hz "
                 f"{self.prf_hz:g} be at least {1.0 / self.prf_hz:g}"
@@ -217,8 +217,8 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
                 "integration is 'noncoherent' and prf_hz is not given: how many pulses are summed?"
             )
 
-    def _least_dwell_s(self) -> tuple[float, str] | None:
-        """Return the shortest time on a beam, and what it is; None if none is known."""
+    def _shortest_dwell_and_reason(self) -> tuple[float, str] | None:
+        """Return the shortest time on a beam (s) and its reason; None if none is known."""
         if self.budget is None and (stated_s := self.stated_dwell_s) is not None:
             return stated_s, "its dwell"
         if self.prf_hz is not None:
@@ -228,7 +228,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
         return None
 
     def _check_scan_rate(self, beams: BeamPositions) -> None:
-        if (least := self._least_dwell_s()) is None:
+        if (least := self._shortest_dwell_and_reason()) is None:
             return
         least_s, what = least
         if self.other_prfs_hz:
@@ -241,7 +241,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
                 f"{beams.elevation} beams of {least_s:.4g} s ({what}) take "
                 f"{least_s * beams.number:.4g} s, and a scan has "
                 f"{1.0 / float(self.scan_rate_hz):.4g} s; it must be at most "
-                f"{_format_limit(1.0 / (least_s * beams.number))}{free}"
+                f"{_format_rounded_down(1.0 / (least_s * beams.number))}{free}"
             )
         look = self.look_energy
         if look is not None and look.summed > MOST_PULSES_SUMMED:
@@ -251,7 +251,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
             )
 
     def check_pulses_once(self, pulses: int, integration_gain_db: float) -> None:
-        """Refuse pulses that are counted twice or that the stated look does not have (errata 6)."""
+        """Raise ValueError if pulses count twice or exceed the stated look's (errata 6)."""
         if self.budget == "dwell" and pulses > 1:
             raise ValueError(
                 f"pulses is {pulses} and budget is 'dwell', which counts the pulses of a look "
@@ -279,8 +279,8 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
             )
 
 
-def _format_limit(value: float) -> str:
-    """Write a limit with four digits so that what is written keeps it."""
+def _format_rounded_down(value: float) -> str:
+    """Return a number with four digits, rounded down, so that it still satisfies the limit."""
     step = 10.0 ** (math.floor(math.log10(value)) - 3)
     return f"{math.floor(value / step) * step:.4g}"
 
@@ -300,7 +300,7 @@ class TimeBudget(Effect[LookEnergy]):
     outside_the_proof = "with it the link budget is that of another look"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether beams share a scan's time, and how: needs ``budget``."""
+        """Return whether the scan's time is shared among beams: needs ``budget = 'dwell'``."""
         p = block.p
         if (look := p.look_energy) is not None:
             pulses = "" if look.pulses is None else f", pulses in it: {look.pulses}"

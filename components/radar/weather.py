@@ -20,12 +20,12 @@ from components.radar.rain import explain_no_rain_echo
 from components.radar.resolution import cell_size
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
-    cells_on_lines,
-    cells_verdict,
-    heights_within,
+    entry_and_exit_heights_m,
     weather_cells,
+    weather_cells_on_sight_lines,
+    weather_cells_verdict,
 )
-from components.terrain.reflection import two_ray_factor
+from components.terrain.reflection import two_ray_power_factor
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -46,7 +46,7 @@ class BlindRange(Effect[CellValues]):
         return Verdict(True, f"minimum_range_m is {nearest:g}")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR: 0 closer than the minimum range, else 1."""
+        """Return a function giving cells' SNR factor: 0 closer than the minimum range, else 1."""
         nearest_m = 0.0 if block.p.minimum_range_m is None else block.p.minimum_range_m
 
         def factor(cells: Cells) -> FloatArray:
@@ -56,7 +56,7 @@ class BlindRange(Effect[CellValues]):
 
 
 class Eclipsing(Effect[CellValues]):
-    """No echo is received while a pulse is sent: the SNR is that of the share that is.
+    """No echo is received while a pulse is sent: the SNR falls to the share that is received.
 
     Of several PRFs the one counts by which just enough see the target.
     """
@@ -72,13 +72,13 @@ class Eclipsing(Effect[CellValues]):
         return Verdict(True, f"pulse_width_s is {width_s:g}")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR."""
+        """Return a function that gives the factor on each cell's SNR: the received share."""
         p = block.p
         if p.pulse_width_s is None:
             return lambda cells: np.ones(len(cells))
 
         def factor(cells: Cells) -> FloatArray:
-            decisive: FloatArray = p.decisive_share(p.shares(np.asarray(cells.range_m)))
+            decisive: FloatArray = p.decisive_share(p.received_shares(np.asarray(cells.range_m)))
             return decisive
 
         return factor
@@ -88,7 +88,7 @@ PROPAGATION = Hook("propagation", CellValues, "factor of each target's echo, and
 
 
 class Multipath(Effect[CellValues]):
-    """Lobes by the ray that flat ground or sea mirrors (`two_ray_factor`)."""
+    """Multipath lobes by the ray reflected from flat ground or sea (`two_ray_power_factor`)."""
 
     name = "multipath"
     acts_on = PROPAGATION
@@ -103,7 +103,7 @@ class Multipath(Effect[CellValues]):
         return Verdict(True, f"[terrain] roughness_m is {terrain.roughness_m:g}")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every target's echo."""
+        """Return a function that gives the factor on each target's echo by the reflected ray."""
         if not self.verdict(block).simulated:
             return lambda cells: np.ones(len(cells))
         terrain, (_, beam_rad, depth_m) = terrain_of(block), cell_size(block.p)
@@ -119,7 +119,9 @@ class Multipath(Effect[CellValues]):
         def factor(cells: Cells) -> FloatArray:
             own_m = cells.of_row("own_alt_m") - terrain.height_m
             far_m = np.maximum(cells.range_m, 1.0)
-            return np.asarray(two_ray_factor(far_m, own_m, cells.alt_m - terrain.height_m, **keys))
+            return np.asarray(
+                two_ray_power_factor(far_m, own_m, cells.alt_m - terrain.height_m, **keys)
+            )
 
         return factor
 
@@ -143,12 +145,12 @@ class Attenuation(Effect[CellValues]):
         bound = self.bound(block) if value > 0 else {}
         return Verdict(value > 0, f"[weather] {self.key} is {text}", bound)
 
-    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
-        """Return the arguments of the table for this effect and no other."""
+    def table_arguments(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return the arguments of the attenuation table for this effect alone, by name."""
         raise TypeError(f"{type(self).__name__} has no settings")
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR."""
+        """Return a function giving cells' SNR factor by the loss on the path both ways."""
         if block.wavelength_m is None:
             return lambda cells: np.ones(len(cells))
         table = self._table(block)
@@ -162,19 +164,20 @@ class Attenuation(Effect[CellValues]):
         return factor
 
     def _table(self, block: Any) -> AttenuationTable:
-        settings = self.settings(block.context.sections["weather"], block)
+        settings = self.table_arguments(block.context.sections["weather"], block)
         return attenuation_table(
             SPEED_OF_LIGHT_M_S / block.wavelength_m, **{"gas": False, **settings}
         )
 
     def bound(self, block: Any) -> dict[str, float]:
-        """Return the largest influence on Pd inside the radar's range, where it has one.
+        """Return the largest possible change of Pd by this effect within the radar's range, by
+        quantity; empty if no bound is known.
 
         The loss is at most its sea-level value times the range, and Pd falls by at most
         max |dPd / d ln SNR| per unit of ln SNR.
         """
         reach_m = block.reach.range_max_m
-        steepness = block.steepest_pd() if hasattr(block, "steepest_pd") else None
+        steepness = block.largest_pd_slope() if hasattr(block, "largest_pd_slope") else None
         if not math.isfinite(reach_m) or steepness is None:
             return {}
         most_db = 2.0 * worst_one_way_db(self._table(block), reach_m)
@@ -193,8 +196,8 @@ def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
     return 1.1 * float(max(level.max(), slanted.max()))
 
 
-def weather_without_carrier(block: Any) -> list[str]:
-    """Return a warning that weather has no effect on a radar whose carrier is not known."""
+def weather_without_carrier_warnings(block: Any) -> list[str]:
+    """Return a warning in a list if there is weather but no carrier known; else an empty list."""
     weather = block.context.sections.get("weather")
     if weather is None or block.wavelength_m is not None or not block.p.enabled:
         return []
@@ -214,8 +217,8 @@ class Gas(Attenuation):
     name = "gas attenuation"
     key = "gas"
 
-    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
-        """Return gas only; with no gas called for, a table without it."""
+    def table_arguments(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return the table's arguments for gas attenuation, by name."""
         return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
 
 
@@ -277,8 +280,8 @@ class Rain(Attenuation):
     name = "rain"
     key = "rain_rate_mm_h"
 
-    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
-        """Return rain only."""
+    def table_arguments(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return the table's arguments for rain attenuation, by name."""
         return {
             "rain_rate_mm_h": weather.rain_rate_mm_h,
             "rain_height_m": weather.rain_top_m,
@@ -293,8 +296,8 @@ class Fog(Attenuation):
     name = "fog"
     key = "fog_water_g_m3"
 
-    def settings(self, weather: Weather, block: Any) -> dict[str, Any]:
-        """Return fog only."""
+    def table_arguments(self, weather: Weather, block: Any) -> dict[str, Any]:
+        """Return the table's arguments for fog attenuation, by name."""
         return {
             "fog_liquid_water_g_m3": weather.fog_water_g_m3,
             "fog_base_m": weather.fog_base_m,
@@ -313,24 +316,29 @@ class CellsOfWeather(Effect[CellValues]):
         """Return whether weather cells have an effect: needs one near, and the radar's carrier."""
         if weather_cells(block) and block.wavelength_m is None:
             return Verdict(False, _NO_CARRIER)
-        return cells_verdict(block)
+        return weather_cells_verdict(block)
 
     def build(self, block: Any) -> CellValues:
-        """Return the factor on every cell's SNR."""
+        """Return a function that gives the factor on each cell's SNR by the weather cells."""
         if not weather_cells(block) or block.wavelength_m is None:
             return lambda cells: np.ones(len(cells))
         weather, tables = block.context.sections["weather"], []
         for one in weather_cells(block):
             of_cell = weather.model_copy(update=one.model_dump(include=_OF_CELL))
-            settings = {**Rain().settings(of_cell, block), **Fog().settings(of_cell, block)}
+            settings = {
+                **Rain().table_arguments(of_cell, block),
+                **Fog().table_arguments(of_cell, block),
+            }
             frequency_hz = SPEED_OF_LIGHT_M_S / block.wavelength_m
             tables.append(attenuation_table(frequency_hz, gas=False, **settings))
 
         def factor(cells: Cells) -> FloatArray:
             loss_db = np.zeros(len(cells))
-            for (_, within), table in zip(cells_on_lines(block, cells), tables, strict=True):
+            for (_, within), table in zip(
+                weather_cells_on_sight_lines(block, cells), tables, strict=True
+            ):
                 length_m = cells.range_m * (within.leaves - within.enters)
-                heights_m = heights_within(cells, within)
+                heights_m = entry_and_exit_heights_m(cells, within)
                 loss_db += one_way_attenuation_db(length_m, *heights_m, table)
             return two_way_transmission(loss_db)
 

@@ -49,8 +49,10 @@ class AcquisitionRange(Parameters):
         return self
 
 
-def check_speeds(ranges: tuple[AcquisitionRange, ...]) -> None:
-    """Raise ValueError unless speeds ascend and the last range is of all others."""
+def check_speeds_ascend(ranges: tuple[AcquisitionRange, ...]) -> None:
+    """Raise ValueError unless the speed limits ascend and the last acquisition range has no limit,
+    so that it covers every faster target.
+    """
     speeds = [math.inf if one.below_m_s is None else one.below_m_s for one in ranges]
     if speeds and (speeds[-1] != math.inf or sorted(set(speeds)) != speeds):
         raise ValueError(
@@ -73,7 +75,7 @@ class Acquired:
         """Return 1 for each cell whose target is seen, else 0."""
         if not self._ranges or len(cells) == 0:
             return np.ones(len(cells))
-        within, near = self._cells_in_range(cells)
+        within, near = self._masks_in_range_and_acquirable(cells)
         width = len(cells.roster.names)
         targets = cells.run * width + cells.target
         missing = (int(cells.run.max()) + 1) * width - len(self._last_scan)
@@ -95,10 +97,12 @@ class Acquired:
         factor[order] = seen
         return factor
 
-    def _cells_in_range(self, cells: Cells) -> tuple[BoolArray, BoolArray]:
-        """Return which cells lie within the range of their target's speed, and which to acquire."""
+    def _masks_in_range_and_acquirable(self, cells: Cells) -> tuple[BoolArray, BoolArray]:
+        """Return two masks over cells: True where the target is within the acquisition range for
+        its speed, and True where it is within the share of that range that holds for its azimuth.
+        """
         azimuth_deg = np.degrees(np.abs(cells.body_azimuth_rad))
-        speed = np.zeros(len(cells)) if len(self._ranges) == 1 else ground_speed_m_s(cells)
+        speed = np.zeros(len(cells)) if len(self._ranges) == 1 else target_ground_speed_m_s(cells)
         limit_m, share = np.zeros(len(cells)), np.zeros(len(cells))
         for one in reversed(self._ranges):
             mine = speed < (math.inf if one.below_m_s is None else one.below_m_s)
@@ -108,8 +112,8 @@ class Acquired:
         return cells.range_m <= limit_m, cells.range_m <= share * limit_m
 
 
-def ground_speed_m_s(cells: Cells) -> FloatArray:
-    """Return how fast each cell's target flies over ground; NaN where it is not there for long.
+def target_ground_speed_m_s(cells: Cells) -> FloatArray:
+    """Return each target's ground speed by cell, m/s; NaN where present too briefly to measure.
 
     By where it is a little later; where it is there no longer, a little before.
     """

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from components.estimation.frame import pose_in_frame
-from components.estimation.measurement import axis_in_body
+from components.estimation.measurement import cone_axis_in_body
 from components.geometry import POSE_FIELDS
 from components.messages.columns import ORIGIN, POSE, STATE
 from components.messages.cues import CueCones
@@ -16,14 +16,16 @@ from dsa_des.arrays.column_values import take_rows
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 
 #: The input over which they come.
 PORT = "cues"
 
 
-def believed_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
-    """Return the ownship's believed pose at each scan, by field of `Detections`, if known."""
+def believed_ownship_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
+    """Return the position and attitude that the ownship believes to have at each scan, as columns
+    of `Detections` by name; empty if navigation is exact.
+    """
     believed = targets.believed
     if believed is None:
         return {}
@@ -46,7 +48,9 @@ class ConesAhead:
         self._old = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return at how many scans no cone counted any more, by run."""
+        """Return the number of scans per run at which all cues received were older than their
+        validity, keyed by the message to show.
+        """
         return {"the cues that it has are older than their lasts_s": self._old}
 
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
@@ -68,18 +72,18 @@ class ConesAhead:
         cued = counts > 0
         old = cued & (np.bincount(scan[live], minlength=len(counts)) == 0)
         run = wake.run
-        self._old = count_cases(self._old, run[old], run[cued])
+        self._old = add_cases(self._old, run[old], run[cued])
         scan, entry, time_s = scan[live], entry[live], time_s[live]
         if len(scan) == 0:
             return None
-        pose = believed_pose(targets, rows[scan])
+        pose = believed_ownship_pose(targets, rows[scan])
         if not pose:
             raise ValueError("cues need the ownship's pose, which these targets come without")
         own = list(pose.values())
         placed = pose_in_frame(
             tuple(getattr(cones, name)[entry] for name in ORIGIN), tuple(own[:3]), tuple(own[3:])
         )
-        axis = axis_in_body(
+        axis = cone_axis_in_body(
             time_s - cones.state_s[entry],
             np.stack([getattr(cones, name)[entry] for name in STATE]),
             np.stack([cones.azimuth_rad[entry], cones.elevation_rad[entry]]),
@@ -99,8 +103,8 @@ class ConesAhead:
         np.logical_or.at(cued, scan, inside)
         return cued
 
-    def with_noise(self, detections: Detections) -> Detections:
-        """Return a report of the same scans whose false alarms say, too, if they lie in a cone.
+    def mark_cued_false_alarms(self, detections: Detections) -> Detections:
+        """Return a copy with ``cued`` True also for false alarms reported in a cue cone.
 
         By where they are reported, as they are nowhere else.
         """
@@ -118,7 +122,9 @@ class ConesAhead:
     def is_in_cones(
         self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> BoolArray:
-        """Return which directions in body axes lie in a cone of their row in the last call."""
+        """Return a mask over directions (azimuth, elevation in body axes): True where the direction
+        lies in a cue cone that is valid at its row.
+        """
         inside = np.zeros(len(row), dtype=bool)
         if self._cones is None:
             return inside
@@ -145,14 +151,14 @@ class CuedLooks(Effect[ConesAhead]):
     acts_on = CUE
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether looks follow cues: needs a wire that brings them."""
+        """Return whether cue cones are simulated, and why: only if a block cues this sensor."""
         sources = _cueing_blocks(block)
         if not sources:
             return Verdict(False, "no wire brings cues")
         return Verdict(True, f"{' and '.join(sources)} cues it")
 
     def build(self, block: Any) -> ConesAhead:
-        """Return a function that finds targets in cue cones."""
+        """Return an object that marks, at each scan, the targets that lie in cue cones."""
         return ConesAhead()
 
 
@@ -165,8 +171,8 @@ CUED_LOOKS = CuedLooks()
 _NO_THRESHOLD = "all inside its range is detected, there is no threshold to lower"
 
 
-def refuse_cues(block: Any, because: str = _NO_THRESHOLD) -> None:
-    """Raise ValueError if a sensor that cannot look harder is cued."""
+def refuse_if_cued(block: Any, because: str = _NO_THRESHOLD) -> None:
+    """Raise ValueError with the given reason if a block cues this sensor, which cannot use it."""
     if sources := _cueing_blocks(block):
         raise ValueError(
             f"{sources[0]} cues it, and it takes no cues: {because}; cue a sensor that has one, or "
@@ -175,7 +181,7 @@ def refuse_cues(block: Any, because: str = _NO_THRESHOLD) -> None:
 
 
 def cue_warnings(block: Any) -> list[str]:
-    """Warn of a wire of cues that changes nothing, and of parameters that no cue ever uses."""
+    """Return a warning if a cued sensor has no cued_* key, or such keys have nothing cueing it."""
     given = [
         name
         for name in type(block.p).model_fields

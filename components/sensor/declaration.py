@@ -15,7 +15,7 @@ import numpy as np
 from components.geometry import body_to_ned, unit_vector
 from components.messages.detections import REPORT, Detections, ReportTransform
 from components.sensor.look import DECLARATION, Cells, Judging, Look
-from dsa_des.arrays.run_ticks import RunTicks, next_position_in_run
+from dsa_des.arrays.run_ticks import RunTicks, first_position_at_or_after
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
 
@@ -28,7 +28,8 @@ def empty_look_memory(n: int, targets: int) -> BoolArray:
 def declare_looks(
     target: IntArray, detected: BoolArray, m: int, n: int, memory: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
-    """Return at which looks (looks,) targets are declared, and the memory for later looks.
+    """Return a mask over looks, True where the target is declared by m of its last n looks, and the
+    memory (targets, n - 1) to pass to the next call.
 
     A target is declared at a look if m or more of its last n looks, this one included, detected
     it. Only looks count, each target's in order of time: a scan that did not look at a target
@@ -61,7 +62,9 @@ class DeclarationRule(Effect[Judging]):
     acts_on = DECLARATION
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether detections are declared m of n: needs ``declare_m`` and ``declare_n``."""
+        """Return whether targets are declared by m of n detections, with the reason: needs
+        ``declare_m`` and ``declare_n``, and no declaration by position.
+        """
         m, n = block.p.declare_m, block.p.declare_n
         if m is None:
             return Verdict(False, "declare_m and declare_n are not given")
@@ -100,29 +103,31 @@ class Declarations:
         targets = cells.run * len(self.names) + cells.target
         runs = int(cells.run.max(initial=0)) + 1
         if len(self._memory) < runs * len(self.names):
-            self._remember(runs * len(self.names))
+            self._grow_memory(runs * len(self.names))
         declared, self._memory = declare_looks(targets, look.detected, self.m, self.n, self._memory)
-        self._note_first(cells, targets, np.flatnonzero(declared))
+        self._store_first_declarations(cells, targets, np.flatnonzero(declared))
         if self.m == 1:  # whatever is reported is declared, and a false alarm is like the others
             return look
         return replace(look, extras={**look.extras, "declared": declared})
 
-    def _remember(self, count: int) -> None:
-        """Remember so many targets."""
+    def _grow_memory(self, count: int) -> None:
+        """Enlarge the arrays per target to `count`; new ones have no detection or declaration."""
         more = count - len(self._memory)
         self._memory = np.concatenate([self._memory, empty_look_memory(self.n, more)])
         self._first_tick = np.append(self._first_tick, np.full(more, -1))
         self._first_range_m = np.append(self._first_range_m, np.full(more, np.nan))
 
-    def _note_first(self, cells: Cells, targets: IntArray, declared: IntArray) -> None:
+    def _store_first_declarations(
+        self, cells: Cells, targets: IntArray, declared: IntArray
+    ) -> None:
         target, index = np.unique(targets[declared], return_index=True)
         new = self._first_tick[target] < 0
         first = declared[index[new]]
         self._first_tick[target[new]] = cells.scan_ticks[cells.row[first]]
         self._first_range_m[target[new]] = cells.range_m[first]
 
-    def first(self) -> dict[str, tuple[int, float]]:
-        """Return by target at which tick it was first declared, and its true range then."""
+    def first_declarations(self) -> dict[str, tuple[int, float]]:
+        """Return by name each declared target's first declaration tick and true range then, m."""
         firsts = zip(self._first_tick.tolist(), self._first_range_m.tolist(), strict=True)
         return {name: one for name, one in zip(self.names, firsts, strict=True) if one[0] >= 0}
 
@@ -138,7 +143,8 @@ _FEW_PAIRS, _SCANS_APART = 10_000, 10.0
 
 @dataclass(frozen=True)
 class SeenPlaces:
-    """Detections as a rule of declaration by position sees them, ascending in run and then in scan.
+    """Table of detections (run, scan, time, direction, range, variances) for declaration by
+    position, sorted by run and then by scan.
 
     `time_s` is when each was measured, `direction` (n, 3) a unit vector in one frame; a range is
     NaN where none is measured, and a variance of NaN counts as 0.
@@ -156,19 +162,20 @@ class SeenPlaces:
         return len(self.scan)
 
     def take(self, which: IntArray | BoolArray) -> SeenPlaces:
-        """Return some of them."""
+        """Return a new table with the entries chosen by index or mask."""
         return SeenPlaces(*(values[which] for values in vars(self).values()))
 
     def append(self, later: SeenPlaces) -> SeenPlaces:
-        """Return the places with later ones appended."""
+        """Return a new table with the entries of `later` added at the end."""
         both = zip(vars(self).values(), vars(later).values(), strict=True)
         return SeenPlaces(*(np.concatenate(pair) for pair in both))
 
 
-def scans_with_company(
+def count_scans_with_neighbour(
     places: SeenPlaces, asked: IntArray, n: int, *, speed_m_s: float, rate_rad_s: float
 ) -> IntArray:
-    """Return in how many of the last n scans, its own included, a detection was at its position.
+    """Return, for each entry of `asked`, in how many of the last n scans (its own counts as one)
+    there is a detection at the same position.
 
     Of the entries that are `asked` about, 1 to n each. Two detections have one position where
     direction and, if both have one, range differ by no more than a target may have moved between
@@ -181,20 +188,22 @@ def scans_with_company(
     neighbours: _Neighbours | None = None
     for lag in range(1, n):
         scans, wanted = RunTicks(places.run, places.scan), places.scan[asked] - lag
-        first = next_position_in_run(scans, RunTicks(places.run[asked], wanted))
-        number = next_position_in_run(scans, RunTicks(places.run[asked], wanted + 1)) - first
-        pairs = _enumerate_pairs(first, number)
+        first = first_position_at_or_after(scans, RunTicks(places.run[asked], wanted))
+        number = first_position_at_or_after(scans, RunTicks(places.run[asked], wanted + 1)) - first
+        pairs = _yield_pair_batches(first, number)
         if int(number.sum()) > _FEW_PAIRS:
             neighbours = neighbours or _Neighbours(places, rate_rad_s)
-            pairs = neighbours.pairs(asked, first, number)
+            pairs = neighbours.nearby_pairs(asked, first, number)
         for here, there in pairs:
             near = _is_same_place(places, asked[here], there, speed_m_s, rate_rad_s)
             count += np.bincount(here[near], minlength=len(asked)) > 0
     return count
 
 
-def _enumerate_pairs(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Return pairs of an asked entry and an entry of its scan, all of each scan."""
+def _yield_pair_batches(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
+    """Yield, in batches that fit into memory, index arrays of all pairs: a position in `first`, and
+    each of the `number` entries that start at its `first`.
+    """
     start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
     while start < len(first):
         part = slice(start, start + most)
@@ -205,7 +214,7 @@ def _enumerate_pairs(first: IntArray, number: IntArray) -> Iterator[tuple[IntArr
 
 
 class _Neighbours:
-    """Finds entries of a scan whose directions may be near: all that are, and few others."""
+    """Search tree that finds the detections of one scan whose direction is near a given one."""
 
     def __init__(self, places: SeenPlaces, rate_rad_s: float) -> None:
         from scipy.spatial import cKDTree
@@ -219,10 +228,12 @@ class _Neighbours:
         self._variance = np.nan_to_num(places.angle_variance_rad2)
         self._tree = cKDTree(np.column_stack([places.direction, _SCANS_APART * self._scan]))
 
-    def pairs(
+    def nearby_pairs(
         self, asked: IntArray, first: IntArray, number: IntArray
     ) -> Iterator[tuple[IntArray, IntArray]]:
-        """Yield indices of the entries asked about, and entries of the scans from `first` on."""
+        """Yield batches of index pairs: a position in `asked`, and an entry of the scan that starts
+        at its `first` whose direction is near enough to compare.
+        """
         some = np.flatnonzero(number)
         mine, scan = asked[some], self._scan[first[some]]
         time_s = self._places.time_s[mine]
@@ -243,7 +254,7 @@ class _Neighbours:
 def _is_same_place(
     places: SeenPlaces, one: IntArray, other: IntArray, speed_m_s: float, rate_rad_s: float
 ) -> BoolArray:
-    """Return which pairs of entries have one position."""
+    """Return which pairs may be one target, by direction and, if both have one, range (mask)."""
     apart_s = np.abs(places.time_s[one] - places.time_s[other])
     variance = np.nan_to_num(places.range_variance_m2)
     gate_m = speed_m_s * apart_s + GATE_DEVIATIONS * np.sqrt(variance[one] + variance[other])
@@ -282,21 +293,27 @@ class DeclaredPlaces:
         if self._memory is not None:
             known = self._memory.append(new)
             asked = asked + len(self._memory)
-            order = RunTicks(known.run, known.scan).order()
+            order = RunTicks(known.run, known.scan).sort_indices()
             if order is not None:  # runs come back one after the other
                 known, asked = known.take(order), np.flatnonzero(order >= len(self._memory))
-        company = scans_with_company(
+        company = count_scans_with_neighbour(
             known, asked, self.n, speed_m_s=self._speed_m_s, rate_rad_s=self._rate_rad_s
         )
         declared = company >= self.m
         if len(detections):
-            self._memory = known.take(known.scan > self._last_scans(detections, known) - self.n + 1)
-        self._note_first(detections, np.flatnonzero(declared & (detections.target >= 0)))
+            self._memory = known.take(
+                known.scan > self._last_scan_of_runs(detections, known) - self.n + 1
+            )
+        self._store_first_declarations(
+            detections, np.flatnonzero(declared & (detections.target >= 0))
+        )
         return replace(detections, extras={**detections.extras, "declared": declared})
 
-    def _last_scans(self, detections: Detections, known: SeenPlaces) -> IntArray:
-        """Return the last scan of each one's run, its own where this report has none of it."""
-        ends = detections.instants.last_of_each
+    def _last_scan_of_runs(self, detections: Detections, known: SeenPlaces) -> IntArray:
+        """Return, for each place in `known`, the number of the last scan of its run in these
+        detections, or its own scan if its run has none there.
+        """
+        ends = detections.instants.last_position_of_runs
         runs, last = detections.run[ends], detections.scan[ends]
         index = np.minimum(np.searchsorted(runs, known.run), len(runs) - 1)
         return np.where(runs[index] == known.run, last[index], known.scan)
@@ -320,7 +337,7 @@ class DeclaredPlaces:
             range_variance_m2=detections.range_variance_m2,
         )
 
-    def _note_first(self, detections: Detections, declared: IntArray) -> None:
+    def _store_first_declarations(self, detections: Detections, declared: IntArray) -> None:
         self.names = detections.roster.names
         row = detections.row_of_entries
         target, place = np.unique(detections.target[declared], return_index=True)
@@ -328,8 +345,8 @@ class DeclaredPlaces:
             tick = int(detections.tick[row[entry]])
             self._first.setdefault(self.names[index], (tick, float(detections.true_range_m[entry])))
 
-    def first(self) -> dict[str, tuple[int, float]]:
-        """Return by target at which tick it was first declared, and its true range then."""
+    def first_declarations(self) -> dict[str, tuple[int, float]]:
+        """Return by name each declared target's first declaration tick and true range then, m."""
         return self._first
 
 
@@ -346,7 +363,7 @@ class DeclarationByPlace(Effect[ReportTransform]):
     outside_the_proof = "without it whatever is reported is declared"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether detections are declared by place: needs ``declare_by = "place"``."""
+        """Return whether declaration counts detections per position, not target, and why."""
         p = block.p
         if p.declare_m is None:
             return Verdict(False, "declare_m and declare_n are not given")

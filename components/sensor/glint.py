@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.geometry import body_angles, body_to_ned, ned_to_body, unit_vector
 from components.messages.detections import LastingPart
 from components.sensor.look import Cells
@@ -25,13 +25,13 @@ _LEAST_AREA_M2 = 0.01
 
 
 class Wander:
-    """Moves lines of sight, and says by how much they are uncertain."""
+    """Shifts lines of sight by glint, and gives the variances that this adds."""
 
     def __init__(self, block: Any) -> None:
         self._share = block.p.glint_share
         self._lasts_s = block.p.glint_correlation_time_s
         self._process = GaussMarkov(block.stream("glint"), self._lasts_s)
-        rosters = [one for one in known_targets(block.context) if len(one.extents_m)]
+        rosters = [one for one in offered_rosters(block.context) if len(one.extents_m)]
         rosters = rosters or [Roster.from_pairs([("", Aircraft())])]
         length2, span2, height2 = np.mean(
             np.concatenate([roster.extents_m for roster in rosters]) ** 2, axis=0
@@ -39,7 +39,7 @@ class Wander:
         #: Mean squares of the extent across and along a level line of sight, and upward, m².
         self._level2, self._upward2 = 0.5 * (length2 + span2), height2
         band = getattr(block, "areas", "") or "eo"
-        shown = np.concatenate([_level_area_m2(roster, band) for roster in rosters])
+        shown = np.concatenate([_mean_level_area_m2(roster, band) for roster in rosters])
         #: Area that shows on a level line of sight, from any side, m².
         self._area_m2 = max(float(np.mean(shown)), _LEAST_AREA_M2)
 
@@ -52,7 +52,7 @@ class Wander:
         range_m: FloatArray,
     ) -> Place:
         """Return where some cells' targets seem to be, in body axes, from where they are."""
-        keys = cells.roster.keys_of(cells.target[detected])
+        keys = cells.roster.draw_keys_of(cells.target[detected])
         when, run = cells.instant_ns[detected], cells.run[detected]
         extent_m = cells.roster.extents_m[cells.craft[detected]]
         length_m, span_m, height_m = (
@@ -75,8 +75,8 @@ class Wander:
         azimuth, elevation = body_angles(x, y, z)
         return azimuth, elevation, np.sqrt(x * x + y * y + z * z)
 
-    def lasting(self) -> dict[str, list[LastingPart]]:
-        """Return the parts of wander that last from look to look, by quantity."""
+    def lasting_parts(self) -> dict[str, list[LastingPart]]:
+        """Return by quantity (angles, range) the glint that stays correlated between looks."""
         share2, lasts_s = self._share**2, self._lasts_s
         return {
             "azimuth": [LastingPart(lasts_s=lasts_s, across_m2=share2 * self._level2)],
@@ -90,7 +90,8 @@ class Wander:
         signal: Mapping[str, FloatArray],
         pixel_rad: tuple[float, float] | None,
     ) -> dict[str, FloatArray]:
-        """Return the variances of wander, by quantity, in the sensor's axes.
+        """Return the variances that glint adds to azimuth, elevation (rad²) and, where range is
+        measured, range (m²), by quantity, in the sensor's axes.
 
         `pixel_rad` is the width and height of a pixel of a sensor that measures a target's size
         instead of its range.
@@ -133,7 +134,7 @@ class Glint(Effect[Wander]):
     outside_the_proof = "every target has an extent"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether glint is simulated: needs ``errors`` and ``glint_share``."""
+        """Return whether glint is on, and why: ``errors`` from the signal, ``glint_share`` > 0."""
         share = getattr(block.p, "glint_share", None)
         if share is None:
             return Verdict(False, "its errors do not follow from signals")
@@ -142,8 +143,8 @@ class Glint(Effect[Wander]):
         return Verdict(share > 0.0, f"glint_share is {share:g}")
 
 
-def _level_area_m2(roster: Roster, band: str) -> FloatArray:
-    """Return what each target's bodies show on level lines of sight, on average over its sides."""
+def _mean_level_area_m2(roster: Roster, band: str) -> FloatArray:
+    """Return each aircraft's projected area, m², seen horizontally, averaged over headings."""
     front, side = (roster.column(f"{band}.{body}_m2") for body in ("front", "side"))
     if band == "ir":
         front = 0.5 * (front + roster.column("ir.back_m2"))

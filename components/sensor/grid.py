@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import TWO_PI, remainder, unwrap_sector, wrap_pi
-from dsa_des.arrays.column_values import constant_column, null_column
+from dsa_des.arrays.column_values import constant_column, null_float_column
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
@@ -54,8 +54,8 @@ class Grid:
             raise ValueError(f"step is {step}: it must be 0 or more")
         self.step = float(step)
         self._countable = min(self.step, 1e200) / _COUNTABLE
-        low = None if limit_low is None else -_outermost(np.float64(-limit_low), step)
-        high = None if limit_high is None else _outermost(np.float64(limit_high), step)
+        low = None if limit_low is None else -_floor_to_grid(np.float64(-limit_low), step)
+        high = None if limit_high is None else _floor_to_grid(np.float64(limit_high), step)
         self._lowest = None if low is None else float(low)
         self._highest = None if high is None else float(high)
         if limit_low is not None and limit_high is not None and limit_low > limit_high:
@@ -69,7 +69,9 @@ class Grid:
             )
 
     def round(self, values: FloatArray) -> FloatArray:
-        """Return values on the grid; they are taken as finite and not checked."""
+        """Return values rounded to the nearest multiple of the step within the grid's limits;
+        values must be finite, which is not checked.
+        """
         if self.step == 0.0:
             result = values
         elif values.size <= _FEW and values.ndim == 1:
@@ -78,7 +80,9 @@ class Grid:
             size = np.abs(values)
             # NaN, and what cannot be counted in steps, take the general way.
             simple = size.size and float(size.max()) < self._countable
-            result = _nearest_countable(size, self.step) if simple else _nearest(size, self.step)
+            result = (
+                _round_countable(size, self.step) if simple else _round_to_grid(size, self.step)
+            )
             result = np.copysign(result, values)
         if self._highest is not None:
             result = np.minimum(result, self._highest)
@@ -87,7 +91,7 @@ class Grid:
         return result + 0.0  # adding 0 turns -0 into 0
 
     def _round_few(self, values: list[float]) -> list[float]:
-        """Round single values with the floating-point steps of `_nearest_countable`."""
+        """Return a short list's values, each rounded exactly as by `_round_countable`."""
         step, countable, low, high = self.step, self._countable, self._lowest, self._highest
         results = []
         for value in values:
@@ -100,7 +104,7 @@ class Grid:
                     whole += 1
                 result = whole * step
             else:
-                result = float(_nearest(np.float64(size), step))
+                result = float(_round_to_grid(np.float64(size), step))
             result = copysign(result, value)
             if high is not None and result > high:
                 result = high
@@ -111,7 +115,7 @@ class Grid:
 
 
 def _split_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
-    """Split size >= 0 exactly into whole steps and a remainder; say where that makes sense."""
+    """Return for sizes >= 0 where rounding applies (mask), the whole steps, exact remainder."""
     counts = (steps > 0.0) & (size * _COUNTABLE < steps) & (size < _LARGEST)
     spacing = np.where(counts, steps, 1.0)
     size = np.where(counts, size, 0.0)
@@ -119,14 +123,16 @@ def _split_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
     return counts, np.rint((size - rest) / spacing), rest
 
 
-def _nearest(size: Any, steps: Any) -> Any:
-    """Round size >= 0 to the grid."""
+def _round_to_grid(size: Any, steps: Any) -> Any:
+    """Return sizes >= 0 rounded to the nearest multiple of their step, ties to even; a size that
+    cannot be counted in steps stays as it is.
+    """
     counts, whole, rest = _split_steps(size, steps)
-    return np.where(counts, (whole + _rounds_up(whole, rest, steps)) * steps, size)
+    return np.where(counts, (whole + _is_rounded_up(whole, rest, steps)) * steps, size)
 
 
-def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
-    """Round sizes >= 0 of which all can be counted in steps."""
+def _round_countable(size: FloatArray, step: float) -> FloatArray:
+    """Return sizes >= 0 rounded to the nearest step; all must be small enough to count in steps."""
     steps = size / step
     whole = np.rint(steps)
     # Off by at most 2^-53 of itself, the quotient tells which point is nearer, but half-way.
@@ -136,13 +142,13 @@ def _nearest_countable(size: FloatArray, step: float) -> FloatArray:
     if np.count_nonzero(unsure):
         rest = np.fmod(size[unsure], step)
         exact = np.rint((size[unsure] - rest) / step)
-        whole[unsure] = exact + _rounds_up(exact, rest, step)
+        whole[unsure] = exact + _is_rounded_up(exact, rest, step)
     whole *= step
     return whole
 
 
-def _rounds_up(whole: Any, rest: Any, steps: Any) -> Any:
-    """Return where the next grid point is nearer; half-way it is the even one."""
+def _is_rounded_up(whole: Any, rest: Any, steps: Any) -> Any:
+    """Return which remainders round up (mask), ties only if the number of whole steps is odd."""
     # rest and steps - rest are compared without rounding: below half a step rest is subtracted
     # from the larger, above it the subtraction is exact (Sterbenz).
     other = steps - rest
@@ -153,8 +159,8 @@ def _rounds_up(whole: Any, rest: Any, steps: Any) -> Any:
     return up
 
 
-def _outermost(limit: Any, steps: Any) -> Any:
-    """Find the largest grid point that is not above the limit (nor outside by a last place)."""
+def _floor_to_grid(limit: Any, steps: Any) -> Any:
+    """Return the largest multiple of the step up to the limit, allowing for its rounding error."""
     size = np.abs(limit)
     counts, whole, rest = _split_steps(size, steps)
     above = limit >= 0.0
@@ -213,10 +219,12 @@ class SensorGrid:
 
     def __call__(self, cells: Any, detected: Any, look: Any, true: Values) -> Measured:
         """Return measured values of true ones by quantity, as `ErrorModel` does."""
-        return self.measure_noise(true)
+        return self.measure_false_alarms(true)
 
-    def measure_noise(self, where: Values, signal: Any = None, drawn: Any = None) -> Measured:
-        """Return values on the grid, and the variances of their rounding: step²/12."""
+    def measure_false_alarms(
+        self, where: Values, signal: Any = None, drawn: Any = None
+    ) -> Measured:
+        """Return false alarms' azimuth, elevation, range on the grid, and variances step²/12."""
         line = self.round(where["azimuth"], where["elevation"], where["range"])
         values = dict(zip(("azimuth", "elevation", "range"), line, strict=True))
         if "range_rate" in where:
@@ -229,11 +237,11 @@ class SensorGrid:
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Round a line of sight to the grid and the field of view (§3.5.1); range may be NaN."""
+        """Return azimuth, elevation (rad), range (m, may be NaN) rounded and clipped (§3.5.1)."""
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:
-            return azimuth, elevation, null_column(len(range_m))
+            return azimuth, elevation, null_float_column(len(range_m))
         return azimuth, elevation, self._range_grid.round(range_m)
 
     @cached_property
@@ -248,7 +256,7 @@ class SensorGrid:
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
-        """The field of view with its upper edge at or above its lower one."""
+        """Field of view's lower and upper azimuth, rad; the upper unwrapped, not below lower."""
         return unwrap_sector(*self._field)
 
     @cached_property

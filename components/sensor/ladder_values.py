@@ -16,13 +16,13 @@ from dsa_des.block.ladder import Measure
 from dsa_des.block.wake import Wake
 
 
-def angle_apart_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
-    """Return the angle between unit vectors, mrad; accurate however small it is."""
+def angle_between_vectors_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
+    """Return the angle between unit vectors in mrad; accurate for tiny angles too."""
     return 1e3 * angle_between_vectors(one, other)
 
 
-def angular_distance_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
-    """Return how far angles in radians are apart, the short way round, mrad; NaN stays NaN."""
+def absolute_angle_difference_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
+    """Return two angles' (rad) absolute difference, at most 180°, in mrad; NaN stays NaN."""
     apart = one - other
     known = ~np.isnan(apart)
     result: FloatArray = np.full(apart.shape, np.nan)
@@ -31,7 +31,9 @@ def angular_distance_mrad(one: AnyArray, other: AnyArray) -> FloatArray:
 
 
 def spread_over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
-    """Return (rows, targets, ...) values over all targets of the run, NaN where absent."""
+    """Return values of the moved targets as an array (rows, all targets of the roster, ...), NaN
+    for a target that is absent or left out.
+    """
     shape = (len(values), len(targets.roster), *values.shape[2:])
     wide: FloatArray = np.full(shape, np.nan)
     wide[:, targets.columns] = values
@@ -48,7 +50,8 @@ def over_cells(
     *,
     out_of_range: float = np.nan,
 ) -> dict[str, FloatArray]:
-    """Return what a function of cells gives by name at every (scan, target).
+    """Evaluate a function of a sensor's cells and return its columns by name, each spread to shape
+    (scans, targets of the roster).
 
     `out_of_range` where the target was not looked at because it is too far away, NaN where it was
     not for any other reason.
@@ -56,7 +59,7 @@ def over_cells(
     held = wake.held("targets")
     if held is None:
         return {}
-    targets, rows = sensor.see_targets(*held)
+    targets, rows = sensor.observed_targets_and_rows(*held)
     cells, reason = sensor.cells(targets, rows, wake)
     on_roster = len(targets.roster)
     wide_by_name: dict[str, Any] = {}
@@ -71,10 +74,12 @@ def over_cells(
     return wide_by_name
 
 
-def measure_cells(
+def make_cell_measure(
     values: Callable[[Any, Cells], dict[str, FloatArray]], *, out_of_range: float = np.nan
 ) -> Measure:
-    """Return what measures a ladder's quantities by a function of a sensor and its cells."""
+    """Return a function `measure(block, wake, reference)` for a ladder of models, which evaluates
+    `values(sensor, cells)` at every scan and target.
+    """
 
     def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
         sensor: Any = block

@@ -8,8 +8,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.messages.targets import RelativeTargets
-from dsa_des.arrays.column_values import is_constant, take_rows
-from dsa_des.arrays.entries import cells_of
+from dsa_des.arrays.column_values import is_stored_once, take_rows
+from dsa_des.arrays.entries import rows_and_columns_of_true
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Hook
@@ -18,7 +18,7 @@ from dsa_des.time.clock import NANOSECONDS, nanosecond_of
 
 @dataclass(frozen=True, eq=False)
 class Look:
-    """The outcome of a look: detection and confidence of each cell.
+    """Result of a look, per cell: whether detected, confidence, signal, and extra columns.
 
     Parameters
     ----------
@@ -43,7 +43,7 @@ class Look:
     tail: FloatArray | None = None
 
     def check(self, cells: int) -> None:
-        """Raise ValueError or TypeError unless arrays have a value of their kind by cell."""
+        """Raise ValueError or TypeError unless arrays have one value per cell, of the due type."""
         truths = {"detected": self.detected, "noise": self.noise}
         numbers = {**self.signal, "tail": self.tail}
         for table in (truths, {"confidence": self.confidence}, self.extras, numbers):
@@ -102,7 +102,7 @@ class Cells:
         self.message_rows = rows
         self.roster = targets.roster
         #: Index of each cell's scan within this look.
-        self.row, self._column = cells_of(wanted)
+        self.row, self._column = rows_and_columns_of_true(wanted)
         width = wanted.shape[1]
         self.scan = scans[self.row]
         self.scan_ticks = targets.tick[rows] if scan_ticks is None else scan_ticks
@@ -123,7 +123,7 @@ class Cells:
         return len(self.target)
 
     def is_cued(self) -> BoolArray:
-        """Return which cells lie in a cone of a cue."""
+        """Return a mask over cells: True where the target lies in a cue cone at this scan."""
         if self.cued is None:
             return np.zeros(len(self), dtype=bool)
         return self.cued
@@ -132,7 +132,7 @@ class Cells:
         if name[0] == "_":
             raise AttributeError(name)
         values = getattr(self._targets, name)
-        if self._width > 1 and is_constant(values):  # of each target
+        if self._width > 1 and is_stored_once(values):  # of each target
             gathered = values[0].take(self._column)
         else:
             flat = values.reshape(-1)
@@ -147,7 +147,7 @@ class Cells:
 
     @cached_property
     def instant_ns(self) -> IntArray:
-        """When each cell is looked at, in whole nanoseconds since the start of its run.
+        """Instant at which each cell is looked at, in whole ns since the start of its run.
 
         A cell that a sweeping beam lights is looked at when it is lit.
         """
@@ -158,13 +158,16 @@ class Cells:
 
     @cached_property
     def state_ns(self) -> IntArray:
-        """When the aircraft were where each cell has them, in ns of its run; see `instant_ns`."""
+        """Instant, in ns since the start of the run, for which each cell's aircraft positions hold;
+        earlier than `instant_ns` if the traffic picture is delayed.
+        """
         if self._targets.state_tick is None:
             return self.instant_ns
         return nanosecond_of(self.of_row("state_tick"), self._ticks_per_s)
 
     def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
-        """Return fields of `RelativeTargets` of some cells, each by itself so many seconds later.
+        """Return the fields of `RelativeTargets` for chosen cells at instants `ahead_s` seconds
+        later than the cell's own, one offset per cell.
 
         The ownship's pose is ``own_lat_deg`` and so on, the target's position ``target_lat_deg``
         and so on; ``present`` says whether both aircraft are there then. ValueError if the targets
@@ -178,17 +181,19 @@ class Cells:
                 "and moving_target_filter to 'none'"
             )
         row, column = np.divmod(self._flat[cells], self._width)
-        time_s = targets.picture_tick[row] / self._ticks_per_s
+        time_s = targets.position_ticks[row] / self._ticks_per_s
         if hasattr(targets, "offset_s"):
             time_s = time_s + self.offset_s[cells]
-        return targets.revisit.each(row, targets.columns[column], time_s, ahead_s)
+        return targets.revisit.columns_of_single_targets(
+            row, targets.columns[column], time_s, ahead_s
+        )
 
     def of_row(self, name: str) -> AnyArray:
-        """Return a field of the message that has one value per row, for each cell."""
+        """Return, for each cell, a per-row field (such as own altitude) at the cell's row."""
         return getattr(self._targets, name).take(self._flat // self._width)
 
     def own_belief(self, name: str) -> FloatArray:
-        """Return the ownship's believed pose for each cell; see `RelativeTargets`."""
+        """Return, for each cell, one component of the ownship's believed pose."""
         believed = self._targets.believed
         if believed is None:
             raise ValueError("a block on the way does not say what the ownship believes of itself")
@@ -196,7 +201,7 @@ class Cells:
 
     @cached_property
     def own_attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Yaw, pitch and roll of the ownship as it flies, for each cell; level where not known."""
+        """True yaw, pitch and roll of the ownship in rad, for each cell; 0 where not known."""
         attitude = self._targets.own_attitude
         if attitude is None:
             zero = np.zeros(len(self))
@@ -206,14 +211,18 @@ class Cells:
         return yaw, pitch, roll
 
     def of_target(self, column: FloatArray) -> AnyArray:
-        """Return a column of the roster (shape (aircraft,)) for each cell."""
+        """Return, for each cell, a roster column (a value per aircraft) at its target."""
         return column[self.craft]
 
     @cached_property
     def craft(self) -> IntArray:
         """Return the index in the roster of each cell's target."""
         roster = self.roster
-        return self.target if roster.is_shared else roster.craft(self.target, self.run)
+        return (
+            self.target
+            if roster.is_same_in_all_replicas
+            else roster.aircraft_index(self.target, self.run)
+        )
 
     @cached_property
     def equipage_rows(self) -> IntArray:
@@ -221,15 +230,17 @@ class Cells:
         return self.roster.equipage_rows(self.craft, self.state_ns)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
-        """Return uniform draws keyed by each cell's target and scan."""
-        keys = self.roster.keys_of(self.target)
+        """Return a uniform number in [0, 1) per cell, determined by run, target and scan."""
+        keys = self.roster.draw_keys_of(self.target)
         return stream.of_runs(self.run, self.instant_ns).uniform(keys, self.scan, draw)
 
 
 def aspect_angles_of_cells(
     cells: Any, chosen: Any = slice(None)
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return heading against the line of sight, pitch, roll, and the line's elevation, of cells."""
+    """Return the target's heading relative to the line of sight, its pitch and roll, and the line's
+    elevation, all in rad, for chosen cells.
+    """
     return (
         cells.relative_heading_rad[chosen],
         cells.target_pitch_rad[chosen],
@@ -245,8 +256,8 @@ class CellValues(Protocol):
         """Return the values, (cells,)."""
 
 
-def values_of(block: Component, built: CellValues, cells: Cells) -> FloatArray:
-    """Return what one of a block's effects gives for its cells; ValueError where that is no such.
+def effect_values_of_cells(block: Component, built: CellValues, cells: Cells) -> FloatArray:
+    """Return an effect's number for each cell; ValueError if its array has another length.
 
     Parameters
     ----------
@@ -271,14 +282,14 @@ def values_of(block: Component, built: CellValues, cells: Cells) -> FloatArray:
 
 
 class Strengthening(Protocol):
-    """Says how strong detections came out."""
+    """Protocol of an effect that gives a measure of strength for each detection."""
 
     def __call__(self, cells: Cells, detected: IntArray, look: Look, /) -> Look:
         """Return the look with the strength of its `detected` cells."""
 
 
 class Judging(Protocol):
-    """Says which detections declare their target."""
+    """Protocol of an effect that marks which detections declare their target."""
 
     def __call__(self, cells: Cells, look: Look, /) -> Look:
         """Return the look with a column ``declared``."""

@@ -19,7 +19,7 @@ from components.sensor.grid import (
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
-from dsa_des.arrays.column_values import constant_column, null_column
+from dsa_des.arrays.column_values import constant_column, null_float_column
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -108,14 +108,16 @@ class ErrorModel:
         `true` is the truth by quantity, in the sensor's axes.
         """
         signal = {name: all_[detected] for name, all_ in look.signal.items()}
-        keys = cells.roster.keys_of(cells.target[detected])
+        keys = cells.roster.draw_keys_of(cells.target[detected])
         scan, run = cells.scan[detected], cells.run[detected]
         instant_ns = cells.instant_ns[detected]
         if look.noise is not None and self._signal:
-            true = self._in_cells(true, look.noise[detected], keys, scan, run, instant_ns)
-        return self.measure_noise(true, signal, (keys, scan, instant_ns, run))
+            true = self._scatter_noise_in_resolution_cells(
+                true, look.noise[detected], keys, scan, run, instant_ns
+            )
+        return self.measure_false_alarms(true, signal, (keys, scan, instant_ns, run))
 
-    def _in_cells(
+    def _scatter_noise_in_resolution_cells(
         self,
         true: Values,
         noise: BoolArray,
@@ -124,7 +126,7 @@ class ErrorModel:
         run: IntArray,
         instant_ns: IntArray,
     ) -> Values:
-        """Return values drawn anywhere in the target's cell, where noise caused the detection.
+        """Return true values, detections by noise moved randomly in their target's cell.
 
         It errs from there, and states of itself, what any report as strong does: noise does not
         say that it is noise.
@@ -138,7 +140,7 @@ class ErrorModel:
             drawn = self._places.of_runs(run[noise], instant_ns[noise])
             part = drawn.uniform(keys[noise], scan[noise], number)
             middle = np.rint(true[name][noise] / width) * width
-            low, high = self._fields.get(name, (-math.inf, math.inf))
+            low, high = self._noise_limits.get(name, (-math.inf, math.inf))
             first = np.maximum(middle - 0.5 * width, low)
             last = np.minimum(middle + 0.5 * width, high)
             places[name] = true[name].copy()
@@ -146,8 +148,10 @@ class ErrorModel:
         return places
 
     @cached_property
-    def _fields(self) -> dict[str, tuple[float, float]]:
-        """Limits between which noise is looked for, by quantity; none where a field wraps."""
+    def _noise_limits(self) -> dict[str, tuple[float, float]]:
+        """Lower and upper limit, by quantity, within which a detection caused by noise can lie; no
+        entry for an azimuth that wraps round.
+        """
         reach = self._block.reach
         fields = {"elevation": reach.elevation_rad}
         if self._block.measures_range:
@@ -157,8 +161,9 @@ class ErrorModel:
             fields["azimuth"] = (low, high)
         return fields
 
-    def measure_noise(self, where: Values, signal: Values, drawn: Any) -> Measured:
-        """Return how something that is not there is reported: as what is there would be.
+    def measure_false_alarms(self, where: Values, signal: Values, drawn: Any) -> Measured:
+        """Return reported values (with errors, on the grid) and variances of false alarms that lie
+        at `where`, as for real targets.
 
         `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
         """
@@ -174,7 +179,7 @@ class ErrorModel:
                 name: where[name] + error * (where[name] if name in self._shares else 1.0)
                 for name, error in errors.items()
             }
-        values = self._valid(where)
+        values = self._round_and_normalise(where)
         count, columns = len(values["azimuth"]), {}
         for name, value in self._variances.items():
             if name in of_signal:
@@ -190,8 +195,9 @@ class ErrorModel:
                 columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + more
         return values, columns
 
-    def _valid(self, values: Values) -> dict[str, FloatArray]:
-        """Return erring values as they are reported: on the grid, and what their kind can be.
+    def _round_and_normalise(self, values: Values) -> dict[str, FloatArray]:
+        """Return values with errors as they are reported: azimuth and elevation wrapped into their
+        intervals, range positive, all on the grid.
 
         An elevation beyond the vertical is one on its other side; a range is above 0.
         """
@@ -203,7 +209,7 @@ class ErrorModel:
         on_grid = {name: grid.round(values[name]) for name, grid in self._grids.items()}
         on_grid["azimuth"] = wrap_pi_unchecked(on_grid["azimuth"])
         if "range" not in on_grid:
-            on_grid["range"] = null_column(len(azimuth))
+            on_grid["range"] = null_float_column(len(azimuth))
         else:
             nearest = self._steps["range"] or _NEAREST_M
             on_grid["range"] = np.maximum(np.abs(on_grid["range"]), nearest)
@@ -229,7 +235,7 @@ class MeasurementErrors(Effect[ErrorModel]):
 
 
 def constant_variances(p: Any, steps: Mapping[str, float]) -> dict[str, float]:
-    """Return the variances that all detections of a sensor share, by column; none by signal."""
+    """Return variances equal for all detections, by column; empty if errors follow the signal."""
     if p.errors == "signal":
         return {}
     stated = p.stated_errors(steps).items()
@@ -256,7 +262,7 @@ def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError
 def add_error_parts(
     errors: Mapping[str, LastingError], parts: Mapping[str, Iterable[LastingPart]]
 ) -> dict[str, LastingError]:
-    """Return lasting errors with more parts, of some quantities."""
+    """Return the lasting errors by quantity, with the given correlated parts appended."""
     joined = dict(errors)
     for name, more in parts.items():
         known = joined.get(name, LastingError())

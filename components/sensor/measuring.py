@@ -34,7 +34,7 @@ class Measuring(Component):
 
     @cached_property
     def axes(self) -> SensorAxes:
-        """The sensor's axes; known once the scene's effects are."""
+        """Orientation of the sensor relative to the ownship's body axes."""
         return self.built_one(AXES) or _BODY_AXES
 
     @cached_property
@@ -44,7 +44,7 @@ class Measuring(Component):
 
     @cached_property
     def wander(self) -> Wander | None:
-        """Where targets seem to be on themselves or None."""
+        """Effect that shifts the apparent position over the target's extent (glint), or None."""
         return self.built_one(APPARENT_PLACE)
 
     @property
@@ -56,23 +56,23 @@ class Measuring(Component):
         """Return the true range rates of some cells, m/s; None where they are not measured."""
         return None
 
-    def seeming_range_m(self, range_m: FloatArray) -> FloatArray:
-        """Return the ranges that targets seem to be at, before errors of measurement."""
+    def apparent_range_m(self, range_m: FloatArray) -> FloatArray:
+        """Return the range reported without errors: the true one, or folded if ambiguous."""
         return range_m
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-        """Return the variances by `Look.signal`, by quantity, in the sensor's axes."""
+        """Return, by quantity, error variances from each detection's signal, in sensor axes."""
         raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
 
     @property
     def steps(self) -> dict[str, float]:
-        """Grid step of each quantity that is measured: rad, m and m/s."""
+        """Grid step to which each measured quantity is rounded, by name, in rad, m and m/s."""
         steps = {"azimuth": self.azimuth_step_rad, "elevation": self.elevation_step_rad}
         return {**steps, "range": self.range_step_m} if self.measures_range else steps
 
     @cached_property
     def grid(self) -> SensorGrid:
-        """The grid of reports in the sensor's axes."""
+        """Grid, in sensor axes, to which azimuth, elevation, range and range rate are rounded."""
         return SensorGrid(self.reach.azimuth_rad, self.reach.elevation_rad, self.steps)
 
     def _measure(
@@ -84,35 +84,40 @@ class Measuring(Component):
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return measurements of lines of sight in body axes, with their columns."""
+        """Return measured azimuths, elevations and ranges in body axes, and a dictionary with
+        variances and range rates, of true lines of sight.
+        """
         if self.wander is not None:
             line = azimuth_rad, elevation_rad, range_m
             azimuth_rad, elevation_rad, range_m = self.wander(cells, detected, *line)
         azimuth, elevation = self.axes(azimuth_rad, elevation_rad)
-        true = {"azimuth": azimuth, "elevation": elevation, "range": self.seeming_range_m(range_m)}
+        true = {"azimuth": azimuth, "elevation": elevation, "range": self.apparent_range_m(range_m)}
         if (rate := self.range_rate(cells, detected)) is not None:
             true["range_rate"] = rate
         return self._to_body_axes(*self._measurement(cells, detected, look, true))
 
-    def report_noise(
+    def report_false_alarms(
         self,
         where: Mapping[str, FloatArray],
         signal: Mapping[str, FloatArray],
         drawn: Any = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return how something that is not there is reported, in body axes, as if it were.
+        """Return the reported azimuths, elevations and ranges in body axes, and the variance
+        columns, of false alarms that lie at `where`.
 
         `where` is its position by quantity in the sensor's axes, `signal` as in `Look.signal`.
         `drawn` holds keys, scan, instant and run by which errors are drawn, as a target's are:
         without them a position by the edge of the field of view would never be reported beyond it.
         The last value holds the other measured columns of `Detections`.
         """
-        return self._to_body_axes(*self._measurement.measure_noise(where, signal, drawn))
+        return self._to_body_axes(*self._measurement.measure_false_alarms(where, signal, drawn))
 
     def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return angles in body axes, ranges, and columns beside, of values in the sensor's."""
+        """Return azimuths and elevations turned from the sensor's axes to body axes, ranges, and
+        the columns of variances and range rates.
+        """
         angles = values["azimuth"], values["elevation"]
         of_angles = self.axes.variances_in_body(*angles, variances[AZIMUTH], variances[ELEVATION])
         beside = {**variances, AZIMUTH: of_angles[0], ELEVATION: of_angles[1]}

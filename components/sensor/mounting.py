@@ -21,7 +21,7 @@ Angles3 = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class SensorAxes:
-    """The axes of a sensor: the ownship's body axes, or turned against them.
+    """Orientation of a sensor in body axes: true mounting angles, and those believed.
 
     Rotations (azimuth, elevation, roll) from body axes to the sensor's, about z, y and x in that
     order: as it is, and as the conversion of its measurements believes it to be. None is a sensor
@@ -31,8 +31,10 @@ class SensorAxes:
     true_rad: Angles3 | None = None
     believed_rad: Angles3 | None = None
 
-    def reach(self, reach: Reach) -> Reach:
-        """Return the sensor's reach for lines of sight in the ownship's body axes."""
+    def reach_in_body_axes(self, reach: Reach) -> Reach:
+        """Return the sensor's reach as one that accepts lines of sight in body axes and turns them
+        by the true mounting angles.
+        """
         if self.true_rad is None:
             return reach
         return MountedReach(
@@ -43,16 +45,20 @@ class SensorAxes:
         """Return angles in the sensor's axes by the true mounting: physics knows no beliefs."""
         return _from_body(body_azimuth_rad, body_elevation_rad, self.true_rad)
 
-    def true_direction(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Return where directions in the sensor's axes truly point, in body axes."""
+    def true_direction_in_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+        """Return body-axis azimuth, elevation (rad) of sensor-axis directions (true mounting)."""
         return _to_body(azimuth_rad, elevation_rad, self.true_rad)
 
     def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Return what the sensor reports in body axes of directions in its own axes."""
+        """Return azimuth and elevation in body axes (rad) of directions in the sensor's axes, by
+        the mounting angles that the ownship believes.
+        """
         return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
 
     def from_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
-        """Return directions in the sensor's own axes of what it reports in body axes."""
+        """Return azimuth and elevation in the sensor's axes (rad) of directions in body axes, by
+        the mounting angles that the ownship believes.
+        """
         return _from_body(azimuth_rad, elevation_rad, self.believed_rad)
 
     def variances_in_body(
@@ -62,7 +68,7 @@ class SensorAxes:
         azimuth_variance_rad2: FloatArray,
         elevation_variance_rad2: FloatArray,
     ) -> Angles:
-        """Return variances of reports in body axes from those in the sensor's axes."""
+        """Return body-axis azimuth and elevation variances (rad²) from the sensor's axes'."""
         if self.believed_rad is None:
             return azimuth_variance_rad2, elevation_variance_rad2
         return rotate_variances(
@@ -99,12 +105,12 @@ class MountedReach(Reach):
 
     @property
     def steepest_rad(self) -> float:
-        """Largest elevation in either axes: the two verticals lean by the boresight's tilt."""
+        """Largest elevation that the sensor reaches, measured in body or in its own axes, rad."""
         _, elevation, roll = self.axes.true_rad or (0.0, 0.0, 0.0)
         tilt = math.acos(max(-1.0, min(1.0, math.cos(elevation) * math.cos(roll))))
         return min(0.5 * math.pi, super().steepest_rad + tilt)
 
-    def decide(
+    def skip_reasons(
         self,
         body_azimuth_rad: FloatArray,
         body_elevation_rad: FloatArray,
@@ -112,9 +118,9 @@ class MountedReach(Reach):
         present: BoolArray,
         hidden: BoolArray | None = None,
     ) -> ReasonArray:
-        """Return the reason why each target is skipped, from its angles in body axes."""
+        """Return a reason code per target, skipped or evaluated, by angles in body axes."""
         angles = self.axes(body_azimuth_rad, body_elevation_rad)
-        return super().decide(*angles, range_m, present, hidden)
+        return super().skip_reasons(*angles, range_m, present, hidden)
 
 
 AXES = Hook("axes", SensorAxes, "the sensor's axes in the ownship's")
@@ -128,7 +134,9 @@ class Mounting(Effect[SensorAxes]):
     outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether mounting angles matter: needs ``mount_*_deg``, ``misalignment_deg``."""
+        """Return whether mounting is simulated, with the reason: needs a non-zero ``mount_*_deg``
+        or ``misalignment_deg``.
+        """
         p = block.p
         turned = [f"{key} is {getattr(p, key):g}" for key in _MOUNT_KEYS if getattr(p, key)]
         if any(p.misalignment_deg):

@@ -35,17 +35,17 @@ class StatedError:
 
     @property
     def mean_bias_square(self) -> float:
-        """Mean square of the bias, over all runs where it is drawn."""
+        """Bias's mean square: a third of its square if drawn for each run, else its square."""
         return self.bias**2 / (3.0 if self.drawn_bias else 1.0)
 
     @property
     def mean_square(self) -> float:
-        """Mean square of what is stated."""
+        """Mean square error without rounding: deviation² plus the mean square of the bias."""
         return self.deviation**2 + self.mean_bias_square
 
     @property
     def variance(self) -> float:
-        """Mean square of rounding and of what is stated, but for a share."""
+        """Rounding's variance plus mean square error, the latter unless a share of the value."""
         return variance_of_step(self.step) + (0.0 if self.share else self.mean_square)
 
 
@@ -93,10 +93,10 @@ class ErrorParameters(ClockedParameters):
     )
 
     @model_validator(mode="after")
-    def _errors(self) -> Self:
+    def _check_error_keys(self) -> Self:
         wrong = []
         for name, unit in self.quantities.items():
-            deviation, bias, lasts = self._keys(name, unit)
+            deviation, bias, lasts = self._error_key_names(name, unit)
             wrong += [
                 f"{key} is {getattr(self, key):g} and errors is 'grid', which knows no errors but "
                 f"rounding: set errors to 'stated', or leave {key} out"
@@ -108,7 +108,7 @@ class ErrorParameters(ClockedParameters):
                     f"{lasts} is given and {deviation} is 0: there is nothing that lasts; give "
                     f"both or neither"
                 )
-        Disagreements.refuse(wrong)
+        Disagreements.raise_if_any(wrong)
         return self
 
     def ineffective_key_notes(self) -> list[str]:
@@ -116,17 +116,18 @@ class ErrorParameters(ClockedParameters):
         said = super().ineffective_key_notes()
         if self.errors == "grid":
             return said + self.note_ineffective("quantised", "biases", because="errors is 'grid'")
-        biases = [self._keys(name, unit)[1] for name, unit in self.quantities.items()]
+        biases = [self._error_key_names(name, unit)[1] for name, unit in self.quantities.items()]
         if not any(getattr(self, key) for key in biases):
             said += self.note_ineffective("biases", because=f"none of {', '.join(biases)} is given")
         return said
 
     @staticmethod
-    def _keys(name: str, unit: str) -> tuple[str, str, str]:
+    def _error_key_names(name: str, unit: str) -> tuple[str, str, str]:
         return f"{name}_error_{unit}", f"{name}_bias_{unit}", f"{name}_correlation_time_s"
 
     def stated_errors(self, steps: Mapping[str, float]) -> dict[str, StatedError]:
-        """Return the errors that the scene states for quantities with these grid steps.
+        """Return, by quantity, the error that the scene states (grid step, deviation, bias,
+        correlation time), in rad, m and m/s.
 
         Nothing of a quantity for which a user's sensor has no such parameters.
         """
@@ -135,7 +136,9 @@ class ErrorParameters(ClockedParameters):
         for name, step in steps.items():
             deviation, bias, lasts_s = 0.0, 0.0, None
             if unit := self.quantities.get(name, ""):
-                deviation, bias, lasts_s = (getattr(self, key) for key in self._keys(name, unit))
+                deviation, bias, lasts_s = (
+                    getattr(self, key) for key in self._error_key_names(name, unit)
+                )
             if unit == "deg":
                 deviation, bias = math.radians(deviation), math.radians(bias)
             share = unit == "share" and self.errors != "grid"
@@ -190,8 +193,10 @@ class GlintParameters(ErrorParameters):
         return said
 
 
-def clockwise_azimuths(value: tuple[float, float]) -> tuple[float, float]:
-    """Return a field of view in azimuth, deg; refuse one that is none."""
+def check_azimuths(value: tuple[float, float]) -> tuple[float, float]:
+    """Return the pair of azimuths (deg, clockwise from first to second) unchanged; ValueError if it
+    is no valid field of view.
+    """
     if not all(-360 <= angle <= 360 for angle in value):
         raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
     if value[0] == value[1] or not -360 < value[1] - value[0] <= 360:
@@ -200,7 +205,7 @@ def clockwise_azimuths(value: tuple[float, float]) -> tuple[float, float]:
 
 
 def check_elevations(value: tuple[float, float]) -> tuple[float, float]:
-    """Return a field of view in elevation, deg; refuse one that is none."""
+    """Return the elevations (deg, lower first) unchanged; ValueError if no valid field of view."""
     if not -90 <= value[0] < value[1] <= 90:
         raise ValueError("must hold two angles in [-90, 90], the lower one first")
     return value
@@ -221,7 +226,7 @@ class SensorParameters(ErrorParameters):
     )  # fmt: skip
 
     enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
-    azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(check_azimuths)] = Field(
         default=(-180.0, 180.0),
         description="Field of view in azimuth, clockwise from the first to the second, deg.",
     )
@@ -277,7 +282,7 @@ class SensorParameters(ErrorParameters):
     )
 
     @model_validator(mode="after")
-    def _declaration_rule(self) -> Self:
+    def _check_declaration_rule(self) -> Self:
         if (self.declare_m is None) != (self.declare_n is None):
             raise ValueError("declare_m and declare_n belong together: give both or neither")
         if (self.declare_m or 0) > (self.declare_n or 0):
@@ -287,7 +292,7 @@ class SensorParameters(ErrorParameters):
         return self
 
     @model_validator(mode="after")
-    def _grid_meets_field(self) -> Self:
+    def _check_grid_in_field(self) -> Self:
         reach = self.reach()
         for angle, (low, high) in (
             ("azimuth", unwrap_sector(*reach.azimuth_rad)),

@@ -20,13 +20,17 @@ from components.messages.detections import (
     LastingError,
     ReportTransform,
     SensorOffer,
-    promises_of_looks,
+    report_interval_promises,
 )
-from components.messages.looks import EveryLook, looks_of
+from components.messages.looks import EveryLook, spread_looks
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
-from components.navigation.errors import NavigationReport, lasting_navigation, navigation_noise
-from components.sensor.cued_looks import CUE, PORT, ConesAhead, believed_pose
+from components.navigation.errors import (
+    NavigationReport,
+    lasting_navigation_errors,
+    navigation_noise_deviations,
+)
+from components.sensor.cued_looks import CUE, PORT, ConesAhead, believed_ownship_pose
 from components.sensor.declaration import DeclarationByPlace, DeclarationRule
 from components.sensor.glint import APPARENT_PLACE, Glint
 from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF
@@ -46,17 +50,17 @@ from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input, Output
 from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.ladder import Verified
-from dsa_des.block.message import Message, offsets_of
+from dsa_des.block.message import Message, offsets_from_entry_rows
 from dsa_des.block.wake import Wake
 
 # Up to so many targets, counting row by row is mostly the overhead of rows.
 _FEW_COLUMNS = 8
 
 
-def count_reasons(
+def count_evaluated_and_skipped(
     reason: ReasonArray, on_roster: int, culled: IntArray | None, hides: bool
 ) -> tuple[IntArray, dict[str, IntArray]]:
-    """Return how many targets were evaluated at each scan, and skipped by reason.
+    """Return each scan's number of targets evaluated, and by reason the number skipped.
 
     Only where something `hides` targets are hidden ones looked for. Which of the culled ones the
     arrays hold, as absent, depends on the window that they came in: what is counted does not.
@@ -69,32 +73,32 @@ def count_reasons(
         of = {code: count[code] for code in (EVALUATE, *SKIP_REASONS.values())}
     else:
         of = {
-            code: _count_per_row(reason == code)
+            code: _count_true_per_row(reason == code)
             for code in (EVALUATE, *SKIP_REASONS.values())
             if hides or code != HIDDEN
         }
-        of.setdefault(HIDDEN, _counts_of_rows(0, rows))
+        of.setdefault(HIDDEN, _constant_counts(0, rows))
     skipped = {name: of[code] for name, code in SKIP_REASONS.items()}
     left_out = on_roster - targets
     if culled is None:
-        culled = _counts_of_rows(left_out, rows)
+        culled = _constant_counts(left_out, rows)
     else:
         skipped["absent"] = skipped["absent"] + (left_out - culled)
     skipped[CULLED] = culled
     return of[EVALUATE], skipped
 
 
-def _count_per_row(mask: BoolArray) -> IntArray:
-    """Return how many are true in each row of few columns: ten times as fast as their sum."""
+def _count_true_per_row(mask: BoolArray) -> IntArray:
+    """Return how many values are True in each row of a narrow mask, faster than a sum."""
     if not np.count_nonzero(mask):
-        return _counts_of_rows(0, len(mask))
+        return _constant_counts(0, len(mask))
     total: Any = mask[:, 0].astype(np.int8)  # a sink keeps them as narrow as they are
     for column in mask.T[1:]:
         total += column
     return total
 
 
-def _counts_of_rows(count: int, rows: int) -> IntArray:
+def _constant_counts(count: int, rows: int) -> IntArray:
     return constant_column(count, rows, np.int64)
 
 
@@ -154,9 +158,9 @@ class Sensor(Measuring):
         self._idle_run = -1
 
     def request(self, port: str) -> Any:
-        """Return a request for the targets in the sensor's reach."""
+        """Return the targets this sensor needs: reach in body axes, and accuracy of range."""
         slack, because = self.range_slack(), self.exact_because()
-        return replace(self._reach_from_body, range_slack=slack, exact_because=because)
+        return replace(self._reach_in_body_axes, range_slack=slack, exact_because=because)
 
     def range_slack(self) -> float:
         """Return the largest relative error of range that leaves results within ``[accuracy]``.
@@ -166,20 +170,20 @@ class Sensor(Measuring):
         return math.inf
 
     def exact_because(self) -> str:
-        """Return why only an exact line of sight will do, or an empty string."""
+        """Return why the sensor needs an exact line of sight, or an empty string."""
         return ""
 
     def offer(self, port: str) -> Any:
-        """Return what this sensor measures and how finely: ranges, angles and their variances."""
+        """Return what this sensor offers: quantities, variances, lasting errors, reach, clock."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
         constant: dict[str, Any] = constant_variances(self.p, self.steps)
         lasting = lasting_errors(self.p, self.steps)
         if Glint().verdict(self).simulated:
-            lasting = add_error_parts(lasting, Glint().build(self).lasting())
+            lasting = add_error_parts(lasting, Glint().build(self).lasting_parts())
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
-            reach = Mounting().build(self).reach(reach)
+            reach = Mounting().build(self).reach_in_body_axes(reach)
             # In the ownship's axes each angle has some of both: the coarser stands for them.
             angles = [lasting.pop(name) for name in ("azimuth", "elevation") if name in lasting]
             if angles:
@@ -187,20 +191,20 @@ class Sensor(Measuring):
                 worst = LastingError(max(one.step for one in angles), parts)
                 lasting |= {"azimuth": worst, "elevation": worst}
         unstated_m2 = 0.0
-        noise = navigation_noise(self.context)
+        noise = navigation_noise_deviations(self.context)
         if self.turned_by_belief and any(map(any, noise)):  # differs with the pose
             unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
-            lasting = add_error_parts(lasting, lasting_navigation(self.context))
+            lasting = add_error_parts(lasting, lasting_navigation_errors(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
             self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
             lasting=lasting, clock=self.p.clock_spec, unstated_across_m2=unstated_m2,
-            promises=promises_of_looks(float(1 / self.p.scan_rate_hz)), **constant,
+            promises=report_interval_promises(float(1 / self.p.scan_rate_hz)), **constant,
         )  # fmt: skip
 
     @cached_property
-    def _reach_from_body(self) -> Reach:
-        return self.axes.reach(self.reach)
+    def _reach_in_body_axes(self) -> Reach:
+        return self.axes.reach_in_body_axes(self.reach)
 
     @cached_property
     def _message(self) -> type[Detections]:
@@ -209,14 +213,14 @@ class Sensor(Measuring):
         return message
 
     @cached_property
-    def _is_asked_for_looks(self) -> bool:
-        """Return whether the scene records every look."""
+    def _is_every_look_recorded(self) -> bool:
+        """Return whether the scene asks to record every look, detected or not."""
         record = self.context.sections.get("record")
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
-        """Return the recorded message types: every look too, where the scene has that."""
-        return [self._message, EveryLook] if self._is_asked_for_looks else [self._message]
+        """Return the message types to record: detections, and all looks if the scene asks."""
+        return [self._message, EveryLook] if self._is_every_look_recorded else [self._message]
 
     @cached_property
     def _judgements(self) -> list[Judging]:
@@ -234,17 +238,18 @@ class Sensor(Measuring):
     def _report_transforms(self) -> list[ReportTransform]:
         return self.built(REPORT)
 
-    def see_targets(
+    def observed_targets_and_rows(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets as this sensor sees them, and the row of each scan.
+        """Return the targets as this sensor observes them (here unchanged; a sweeping beam at its
+        own instants), and the row of each scan in them.
 
         `cued` (scans, targets) says which lie in a cue cone.
         """
         return targets, rows
 
     def look(self, cells: Cells) -> Look:
-        """Decide for each cell whether it is detected; the physics of the sensor.
+        """Return detection, confidence, signal per cell; sensor kinds put their physics here.
 
         A second look in a row that has no cells is not asked for.
         """
@@ -258,7 +263,7 @@ class Sensor(Measuring):
         if held is None:
             return None
         cued = None if self._cue_cones is None else self._cue_cones(*held, wake)
-        targets, rows = self.see_targets(*held, cued)
+        targets, rows = self.observed_targets_and_rows(*held, cued)
         cells, reason = self.cells(targets, rows, wake)
         if cued is not None:
             cells.cued = cued[reason == EVALUATE]
@@ -279,14 +284,14 @@ class Sensor(Measuring):
         for measures in self._strengths:
             look = measures(cells, detected, look)
         culled = None if targets.culled is None else targets.culled[rows]
-        evaluated, skipped = count_reasons(
+        evaluated, skipped = count_evaluated_and_skipped(
             reason, len(targets.roster), culled, targets.hidden is not None
         )
         row = cells.row[detected]
         if len(wake) == 1:
             offsets = np.array([0, len(detected)], dtype=np.int64)
         else:
-            offsets = offsets_of(row, len(wake))
+            offsets = offsets_from_entry_rows(row, len(wake))
         measured: dict[str, Any] = {}
         p, q, r = (cells.body_azimuth_rad[detected], cells.body_elevation_rad[detected],
                    cells.range_m[detected])  # fmt: skip
@@ -311,18 +316,18 @@ class Sensor(Measuring):
             **measured,
             extras={name: values[detected] for name, values in self._extras(cells, look).items()},
             roster=targets.roster,
-            **believed_pose(targets, rows),
-            looks=looks_of(cells, decided, len(wake)) if self._is_asked_for_looks else None,
+            **believed_ownship_pose(targets, rows),
+            looks=spread_looks(cells, decided, len(wake)) if self._is_every_look_recorded else None,
         )
         detections.row_of_entries = row
         for report in self._report_transforms:
             detections = report(detections, targets, rows)
         if self._cue_cones is not None:
-            detections = self._cue_cones.with_noise(detections)
+            detections = self._cue_cones.mark_cued_false_alarms(detections)
         return detections
 
     def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return the recorded columns of each cell beside its detection."""
+        """Return extra columns to record per cell: the look's, and ``cued`` with cues received."""
         if self._cue_cones is None:
             return look.extras
         return {**look.extras, "cued": cells.is_cued()}
@@ -330,18 +335,18 @@ class Sensor(Measuring):
     def cells(
         self, targets: RelativeTargets, rows: IntArray, wake: Wake
     ) -> tuple[Cells, ReasonArray]:
-        """Return the cells that need our physics, and the reason for every (scan, target)."""
-        reason = self._decide(targets, rows)
+        """Return the (scan, target) cells to compute, and for all scans and targets why or not."""
+        reason = self._reasons_of_scans(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
         return cells, reason
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often the cues that it had were too old."""
+        """Return, by message, the scans per run with cues too old; empty without cues."""
         return {} if self._cue_cones is None else self._cue_cones.failure_counts()
 
     def report(self) -> dict[str, Any]:
-        """Return when each target was first declared, if the sensor has a rule for it."""
+        """Return each target's first declaration, tick and range, if there is such a rule."""
         rule = "declaration" if self.p.declares_by == "target" else "declaration by place"
         declarations = self.context.effects.get(rule)
         if declarations is None or self.p.declare_m is None:
@@ -350,19 +355,21 @@ class Sensor(Measuring):
         # A window may have looked beyond an early end of the run.
         end_tick = self.context.duration_s * ticks_per_s
         first: dict[str, dict[str, float] | None] = dict.fromkeys(declarations.names)
-        for target, (tick, range_m) in declarations.first().items():
+        for target, (tick, range_m) in declarations.first_declarations().items():
             if tick < end_tick:
                 first[target] = {"time_s": tick / ticks_per_s, "range_m": range_m}
         return {"declarations": {self.name: first}}
 
-    def _decide(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
-        """Return the reasons of each scan, from the gate's decision if it has one."""
+    def _reasons_of_scans(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
+        """Return a reason code (scans, targets): evaluate, or why it is skipped; taken from an
+        upstream gate if there is one, else by the sensor's reach.
+        """
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
             reason = targets.decisions[self.name].reasons_at(rows)
             if reason is not None:
                 return reason
         part = targets.take(rows)
-        return self._reach_from_body.decide(
+        return self._reach_in_body_axes.skip_reasons(
             part.body_azimuth_rad,
             part.body_elevation_rad,
             part.range_m,

@@ -18,18 +18,18 @@ _MARGIN, _MARGIN_M = 1.01, 100.0
 
 
 def weather_cells(block: Any) -> tuple[WeatherCell, ...]:
-    """Return the cells of a block's scene."""
+    """Return the weather cells (rain, cloud) in the scene of a block; empty without weather."""
     weather = block.context.sections.get("weather")
     cells: tuple[WeatherCell, ...] = () if weather is None else weather.cells
     return cells
 
 
-def cells_verdict(block: Any) -> Verdict:
-    """Return whether a cell may come near any line of sight of a sensor."""
+def weather_cells_verdict(block: Any) -> Verdict:
+    """Return whether a weather cell can come near this sensor's lines of sight, and why."""
     cells = weather_cells(block)
     if not cells:
         return Verdict(False, "[weather] has no cells")
-    apart_m = _apart_m(block)
+    apart_m = _min_cell_distances_m(block)
     if apart_m is None:
         return Verdict(True, f"[weather] has {len(cells)} cells, and flights may go anywhere")
     near = [str(number) for number, metres in enumerate(apart_m) if metres <= 0.0]
@@ -42,8 +42,10 @@ def cells_verdict(block: Any) -> Verdict:
     return Verdict(False, why)
 
 
-def _apart_m(block: Any) -> list[float] | None:
-    """Return how far from all lines of sight each cell stays at least, or None if not known."""
+def _min_cell_distances_m(block: Any) -> list[float] | None:
+    """Return for each weather cell a lower bound of its horizontal distance to all lines of sight,
+    m; None if flights are not known.
+    """
     offers = [producer.offer for producer in block.context.producers]
     known = [offer for offer in offers if isinstance(offer, KnownTraffic)]
     # Other runs beside this one may have other flights.
@@ -64,17 +66,17 @@ def _apart_m(block: Any) -> list[float] | None:
     return apart_m
 
 
-def cells_on_lines(block: Any, cells: Cells) -> Iterator[tuple[WeatherCell, Within]]:
-    """Yield each cell of the weather with what of each line of sight lies in it."""
+def weather_cells_on_sight_lines(block: Any, cells: Cells) -> Iterator[tuple[WeatherCell, Within]]:
+    """Yield each weather cell with the part (from, to as shares) of every line of sight in it."""
     place = [cells.of_row(f"own_{name}") for name in ("lat_deg", "lon_deg", "alt_m")]
     line = cells.azimuth_rad, cells.elevation_rad, cells.range_m
     time_s = cells.state_ns / NANOSECONDS
     for one in weather_cells(block):
-        yield one, one.within(place, line, time_s)
+        yield one, one.path_share_in_cell(place, line, time_s)
 
 
-def heights_within(cells: Cells, within: Within) -> tuple[FloatArray, FloatArray]:
-    """Return at which heights lines of sight enter and leave a cell, m."""
+def entry_and_exit_heights_m(cells: Cells, within: Within) -> tuple[FloatArray, FloatArray]:
+    """Return the heights (m) at which each line of sight enters and leaves a weather cell."""
     own_m = cells.of_row("own_alt_m")
     climb_m = cells.alt_m - own_m
     return own_m + within.enters * climb_m, own_m + within.leaves * climb_m

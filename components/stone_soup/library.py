@@ -25,7 +25,7 @@ def require_stone_soup(what: str) -> None:
 
 
 class Repeatable:
-    """What a tracker's order and draws follow from."""
+    """Random state and order of objects that make Stone Soup's results the same in every run."""
 
     def __init__(self, seed: int) -> None:
         self._numbers = count()
@@ -33,8 +33,10 @@ class Repeatable:
         self._python = random.Random(seed).getstate()
 
     @contextmanager
-    def working(self) -> Iterator[None]:
-        """Restore global random state after Stone Soup's work in this context."""
+    def isolated_random_state(self) -> Iterator[None]:
+        """Context in which Stone Soup draws from this object's own random state; the global
+        generators and its hash are restored afterwards.
+        """
         from stonesoup.base import Base
 
         numbers = self._numbers

@@ -29,13 +29,15 @@ START = datetime(2000, 1, 1)
 POSITION, VELOCITY = (0, 2, 4), (1, 3, 5)
 
 
-def instant(time_s: float) -> datetime:
-    """Return an instant of a run, to the microsecond that such objects can hold."""
+def to_datetime(time_s: float) -> datetime:
+    """Return the time of a run (s) as a datetime, rounded to the microsecond."""
     return START + timedelta(microseconds=round(1e6 * time_s))
 
 
 def state_vectors(position_ned_m: FloatArray, velocity_ned_m_s: FloatArray) -> list[StateVector]:
-    """Return states of positions and velocities, each (3, n) along north, east, down."""
+    """Return Stone Soup state vectors (east, north, up and their velocities) from positions and
+    velocities (3, n) along north, east, down.
+    """
     result = np.empty((6, position_ned_m.shape[1]))
     for part, ned in ((POSITION, position_ned_m), (VELOCITY, velocity_ned_m_s)):
         result[list(part)] = ned[1], ned[0], -ned[2]
@@ -43,7 +45,7 @@ def state_vectors(position_ned_m: FloatArray, velocity_ned_m_s: FloatArray) -> l
 
 
 class Poses:
-    """Where sensors are and how they are turned, as measurement models take it."""
+    """Positions, orientations, velocities of sensors as Stone Soup's measurement models take."""
 
     def __init__(
         self, pose: SensorPose, mapping: Sequence[int] = POSITION, state_size: int = 6
@@ -51,7 +53,7 @@ class Poses:
         self._mapping, self._size = tuple(mapping), state_size
         north, east, down = pose.position_m
         self._offset = np.stack([east, north, -down])
-        self._angles = rotation_offsets(pose.to_body)
+        self._angles = euler_angles_rad(pose.to_body)
         moves = np.full_like(pose.position_m, np.nan)
         if pose.velocity_m_s is not None:
             moves = pose.velocity_m_s
@@ -62,10 +64,10 @@ class Poses:
         return StateVector(self._offset[:, i])
 
     def orientation(self, i: int) -> StateVector:
-        """Return roll, pitch and yaw of sensor i (`components.stone_soup.objects`)."""
+        """Return roll, pitch and yaw of sensor i in rad, in Stone Soup's convention."""
         return StateVector(self._angles[:, i])
 
-    def model(self, i: int, variances: FloatArray) -> Any:
+    def measurement_model(self, i: int, variances: FloatArray) -> Any:
         """Return Stone Soup's measurement model of sensor i with noise of these variances."""
         common = {
             "ndim_state": self._size,
@@ -82,8 +84,8 @@ class Poses:
             return CartesianToElevationBearingRange(**common)
         return CartesianToElevationBearing(**common)
 
-    def moves(self, i: int) -> bool:
-        """Return whether the velocity of sensor i is known, without which a rate says nothing."""
+    def has_velocity(self, i: int) -> bool:
+        """Return whether sensor i's velocity is known; without it no range rate can be used."""
         return bool(np.isfinite(self._velocity[:, i]).all())
 
 
@@ -100,7 +102,7 @@ class NumberedDetection(Detection):
         return self.number
 
 
-def detections(
+def make_detections(
     poses: Poses,
     which: "list[int]",
     when: datetime,
@@ -108,7 +110,7 @@ def detections(
     variance: FloatArray,
     metadata: "list[dict[str, Any]]",
 ) -> set[Detection]:
-    """Return detections of one look.
+    """Return a look's Stone Soup detections, with measured values and measurement models.
 
     Parameters
     ----------
@@ -127,13 +129,13 @@ def detections(
         if ranged:
             vector.append(range_m)
             rows.append(2)
-            if rate == rate and variance[3, k] > 0.0 and poses.moves(i):
+            if rate == rate and variance[3, k] > 0.0 and poses.has_velocity(i):
                 vector.append(rate)
                 rows.append(3)
         one = NumberedDetection(
             StateVector(vector),
             timestamp=when,
-            measurement_model=poses.model(i, variance[rows, k]),
+            measurement_model=poses.measurement_model(i, variance[rows, k]),
             metadata=metadata[k],
         )
         one.number = k
@@ -145,8 +147,8 @@ def detections(
 _UPRIGHT = 1e-9
 
 
-def rotation_offsets(to_body: FloatArray) -> FloatArray:
-    """Return rotations as angles."""
+def euler_angles_rad(to_body: FloatArray) -> FloatArray:
+    """Return (roll, pitch, yaw) (3, n), rad, as Stone Soup's, of NED-to-body matrices (3, 3, n)."""
     # Columns along east, north, up; rows along nose, left wing, roof.
     turned = to_body[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0])[np.newaxis, :, np.newaxis]
     turned *= np.array([1.0, -1.0, -1.0])[:, np.newaxis, np.newaxis]

@@ -13,7 +13,7 @@ from dsa_des.arrays.types import FloatArray
 
 @dataclass
 class Followed:
-    """A track as it is reported."""
+    """A reported Stone Soup track: number, status, state, covariance, ages and sensors."""
 
     number: int  # Its own, from 1, in the order of appearance
     status: int = CONFIRMED
@@ -30,7 +30,7 @@ class Followed:
 
 
 class Follower:
-    """Turns the tracks of a tracker into what is reported of them."""
+    """Keeps what is to be reported of each Stone Soup track, updated after every look."""
 
     def __init__(self, position: "tuple[int, ...]", velocity: "tuple[int, ...]") -> None:
         east, north, up = range(3)
@@ -40,10 +40,12 @@ class Follower:
         self._tracks: dict[str, Followed] = {}
         self._next = 1
 
-    def follow_look(
+    def update_tracks(
         self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
     ) -> list[Followed]:
-        """Return all tracks after a look, by number; those that are gone a last time."""
+        """Update what is kept of each track after a look, and return all tracks by number; those
+        that ended are returned once more as deleted.
+        """
         from components.stone_soup.objects import START
 
         def seconds(instant: datetime) -> float:
@@ -54,23 +56,23 @@ class Follower:
         for one in gone:
             one.status = DELETED
         fresh = [track for name, track in alive.items() if name not in self._tracks]
-        for track in sorted(fresh, key=self._place):
+        for track in sorted(fresh, key=self._sort_key):
             self._tracks[track.id] = Followed(self._next)
             self._next += 1
         for name, one in self._tracks.items():
-            self._follow(one, alive[name], seconds, mask_of)
+            self._update_followed(one, alive[name], seconds, mask_of)
         return sorted([*gone, *self._tracks.values()], key=lambda one: one.number)
 
     def __bool__(self) -> bool:
         """Return whether there are tracks."""
         return bool(self._tracks)
 
-    def _place(self, track: Any) -> tuple[float, ...]:
-        """Return what orders tracks that appear at the same time: where they are."""
-        state, _ = self._moments(track)
+    def _sort_key(self, track: Any) -> tuple[float, ...]:
+        """Return the track's state as a tuple, which orders tracks of the same instant."""
+        state, _ = self._mean_and_covariance(track)
         return tuple(state.tolist())
 
-    def _moments(self, track: Any) -> tuple[FloatArray, FloatArray]:
+    def _mean_and_covariance(self, track: Any) -> tuple[FloatArray, FloatArray]:
         try:
             mean = np.array(track.state.mean, dtype=float).reshape(-1)
             spread = np.array(track.state.covar, dtype=float)
@@ -89,21 +91,21 @@ class Follower:
             raise ValueError("a state or covariance of its is not finite")
         return state, covariance
 
-    def _follow(
+    def _update_followed(
         self,
         one: Followed,
         track: Any,
         seconds: Callable[[datetime], float],
         mask_of: Mapping[str, int],
     ) -> None:
-        one.state, one.covariance = self._moments(track)
+        one.state, one.covariance = self._mean_and_covariance(track)
         one.state_s = seconds(track.timestamp)
         one.age_s = one.state_s - seconds(track.states[0].timestamp)
         if one.seen > len(track.states):  # a tracker may shorten the past
             one.seen = 0
         last = track.states[-1]
         for state in track.states[one.seen :]:
-            measured = _measurements(state)
+            measured = _detections_of_state(state)
             if not measured:
                 continue
             one.updated_s = seconds(state.timestamp)
@@ -115,11 +117,11 @@ class Follower:
                 one.ranged |= len(detection.state_vector) > 2
             one.contributors |= one.updated_by
         one.seen = len(track.states)
-        one.status = CONFIRMED if _measurements(last) else COASTED
+        one.status = CONFIRMED if _detections_of_state(last) else COASTED
 
 
-def _measurements(state: Any) -> list[Any]:
-    """Return the detections that a state was updated with."""
+def _detections_of_state(state: Any) -> list[Any]:
+    """Return the detections with which a Stone Soup state was updated; empty for a prediction."""
     hypothesis = getattr(state, "hypothesis", None)
     if hypothesis is None:
         return []

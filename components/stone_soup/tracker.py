@@ -10,28 +10,30 @@ from pydantic import BeforeValidator, Field, model_validator
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import Kind, linearise
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
-from components.messages.detections import SensorOffer, sensor_offers
+from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
-from components.sensor.marks import TRACKER
+from components.sensor.palette import TRACKER
 from components.stone_soup.library import Repeatable, require_stone_soup
 from components.stone_soup.reported_tracks import Followed, Follower
 from components.tracking.due_detections import ACTS_EVERY_S, Promises
-from components.tracking.out_of_sequence import LookCount, latest_s
-from components.tracking.reported_errors import folded_ranges, unknown_latency
-from components.tracking.scans import Scans, scans_of, split_due_looks
+from components.tracking.out_of_sequence import LookCount, max_lateness_s
+from components.tracking.reported_errors import folded_range_warnings, latency_warnings
+from components.tracking.scans import Scans, looks_of_message, split_due_looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
-from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
+from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, load_named
 from dsa_des.block.source_file import absolute_type_name
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of
 
 
-def _builder(value: Any) -> Any:
-    """Return a name with the file written out; a bare ``file.py`` lies beside the scene."""
+def _absolute_builder_path(value: Any) -> Any:
+    """Return the name of the builder function with its file as an absolute path; a bare ``file.py``
+    is taken from the scene's folder.
+    """
     if not isinstance(value, str):
         return value
     file = value.rpartition(":")[0]
@@ -44,7 +46,7 @@ def _builder(value: Any) -> Any:
 class StoneSoupParameters(Parameters):
     """What is built, and how its states are laid out."""
 
-    builder: Annotated[str, BeforeValidator(_builder)] = Field(
+    builder: Annotated[str, BeforeValidator(_absolute_builder_path)] = Field(
         description="The function that builds the tracker: my_tracker.py:build, beside the scene, "
         "or module:build. It is called without arguments.",
     )
@@ -69,7 +71,7 @@ class StoneSoupParameters(Parameters):
 
 
 class StoneSoupTracker(Component):
-    """Hands every look to a tracker of Stone Soup's, and reports its tracks.
+    """Passes every look to a tracker built with Stone Soup, and reports its tracks.
 
     The tracker is whatever the builder returns that has ``update_tracker(time, detections)``, as
     Stone Soup's have. Every sensor's look is handed over by itself, in the order of instants; with
@@ -97,11 +99,13 @@ class StoneSoupTracker(Component):
         self._looked_tick = self._newest = -1
         self._count = LookCount()
         producers = self.context.producers
-        offers, ticks_per_s = sensor_offers(producers), self.context.ticks_per_s
-        self._wait_ticks = int(latest_s(offers, producers) * ticks_per_s)
+        offers, ticks_per_s = offers_of_fused_sensors(producers), self.context.ticks_per_s
+        self._wait_ticks = int(max_lateness_s(offers, producers) * ticks_per_s)
         promises = Promises.of(offers, tuple(offers), ticks_per_s)
         everywhere = np.full(1, np.inf)
-        (self._quiet_ticks,) = promises.life_ticks(np.ones((len(offers), 1), bool), everywhere)
+        (self._quiet_ticks,) = promises.track_life_ticks(
+            np.ones((len(offers), 1), bool), everywhere
+        )
         self._masks: dict[str, int] = {}
         self._follower = Follower(self.p.position_mapping, self.p.velocity_mapping)
         self._repeatable = Repeatable(
@@ -110,9 +114,9 @@ class StoneSoupTracker(Component):
         self._tracker = self._build_tracker()
 
     def warnings(self) -> list[str]:
-        """Return a warning for each sensor with lasting errors, which Stone Soup takes for new."""
-        offers = sensor_offers(self.context.producers)
-        said = unknown_latency(offers) + folded_ranges(offers)
+        """Return warnings for sensors with lasting errors, unknown latency or ambiguous ranges."""
+        offers = offers_of_fused_sensors(self.context.producers)
+        said = latency_warnings(offers) + folded_range_warnings(offers)
         for name, offer in sorted(offers.items()):
             lasting = offer.lasting if isinstance(offer, SensorOffer) else None
             if lasting is None or lasting:
@@ -136,7 +140,7 @@ class StoneSoupTracker(Component):
         if not callable(build):
             raise ValueError(f"builder = {name}: is no function that builds a tracker")
         try:
-            with wrap_foreign_errors(), self._repeatable.working():
+            with wrap_foreign_errors(), self._repeatable.isolated_random_state():
                 tracker = build()
         except ForeignFailure as error:
             raise ValueError(f"builder = {name}: failed with {error}") from error.__cause__
@@ -148,12 +152,12 @@ class StoneSoupTracker(Component):
         return tracker
 
     def acts_every_s(self) -> Fraction | None:
-        """Return how often silence is looked for, s."""
+        """Return the interval, s, of checking whether tracks without detections must end."""
         return ACTS_EVERY_S
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Process looks that came and looks that are missing, in order; return all tracks."""
-        due = self._due(wake)
+        due = self._due_looks_by_row(wake)
         entries: list[tuple[int, FloatArray, Followed]] = []
         rows: list[int] = []
         for row, tick in enumerate(wake.ticks.tolist()):
@@ -174,13 +178,13 @@ class StoneSoupTracker(Component):
                 entries += [(row, self._own_m, replace(one)) for one in here.values()]
         return self._message(wake, rows, entries) if rows else None
 
-    def _due(self, wake: Wake) -> dict[int, list[tuple[Scans, SensorPose]]]:
-        """Return the looks that are handed over at rows of a wake, in order, with their poses."""
+    def _due_looks_by_row(self, wake: Wake) -> dict[int, list[tuple[Scans, SensorPose]]]:
+        """Return by wake row the looks due for Stone Soup, in order, with the sensor's pose."""
         busy = wake.without_idle()
         fused = None if busy is None else busy["fused"]
         if fused is not None:
             self._sensors = fused.sensors
-            came = scans_of(fused)
+            came = looks_of_message(fused)
             came = replace(came, row=np.flatnonzero(~wake.idle)[came.row])
             self._count = self._count.add_looks(fused.sensors, came, slice(None), [])
         elif self._ahead is not None:
@@ -200,20 +204,20 @@ class StoneSoupTracker(Component):
         return due
 
     def _is_silent(self, tick: int) -> bool:
-        """Return whether nothing has come for so long that tracks may have to end."""
+        """Return whether no look has arrived for so long that tracks may have to be deleted."""
         quiet = tick - self._wait_ticks - self._looked_tick
         return bool(self._follower) and self._ahead is None and quiet >= self._quiet_ticks
 
     def _process_look(self, look: Scans, pose: SensorPose, wake: Wake) -> "list[Followed]":
         """Pass one look to Stone Soup, and return the tracks after it."""
-        from components.stone_soup.objects import Poses, detections, instant
+        from components.stone_soup.objects import Poses, make_detections, to_datetime
 
         (tick,) = look.tick.tolist()
         masks = look.contributors.tolist()
         names = ["+".join(n for i, n in enumerate(self._sensors) if m >> i & 1) for m in masks]
-        result = detections(
+        result = make_detections(
             Poses(pose, self.p.position_mapping, self.p.state_size), [0] * len(masks),
-            instant(tick / wake.ticks_per_s), look.measured, look.variance,
+            to_datetime(tick / wake.ticks_per_s), look.measured, look.variance,
             [{"sensor": name} for name in names],
         )  # fmt: skip
         self._masks.update(zip(names, masks, strict=True))
@@ -222,18 +226,20 @@ class StoneSoupTracker(Component):
 
     def _process_instant(self, tick: int, wake: Wake, found: "set[Any]") -> "list[Followed]":
         """Pass the detections of one instant to Stone Soup, and return the tracks after it."""
-        from components.stone_soup.objects import instant
+        from components.stone_soup.objects import to_datetime
 
         time_s = tick / wake.ticks_per_s
-        when, self._newest = instant(time_s), tick
-        with self._repeatable.working():
+        when, self._newest = to_datetime(time_s), tick
+        with self._repeatable.isolated_random_state():
             _, tracks = self._tracker.update_tracker(when, found)
-            return self._follower.follow_look(tracks, time_s, when, self._masks)
+            return self._follower.update_tracks(tracks, time_s, when, self._masks)
 
     def _message(
         self, wake: Wake, rows: list[int], entries: "list[tuple[int, FloatArray, Followed]]"
     ) -> StateTracks:
-        """Return tracks as a message: of each its row, where the ownship was, and its report."""
+        """Return the message with these tracks, each given by its row, the ownship's position and
+        what is to be reported.
+        """
         tracks = [one for _, _, one in entries]
         count = len(tracks)
         own_m = np.array([own for _, own, _ in entries]).reshape(count, 3).T
@@ -265,7 +271,7 @@ class StoneSoupTracker(Component):
         }
         return StateTracks(
             tick=wake.ticks[rows],
-            offsets=offsets_of(of_row, len(rows)),
+            offsets=offsets_from_entry_rows(of_row, len(rows)),
             track=column("number", np.int64),
             track_status=column("status", np.int64),
             existence=np.full(count, np.nan),
@@ -286,4 +292,4 @@ class StoneSoupTracker(Component):
 
     def report(self) -> dict[str, Any]:
         """Return how many looks came too late, by sensor."""
-        return {"late_looks": {self.name: self._count.late()}}
+        return {"late_looks": {self.name: self._count.late_look_statistics()}}

@@ -15,15 +15,19 @@ from components.messages.detections import (
     LastingError,
     LastingPart,
     SensorOffer,
-    promises_of_looks,
+    report_interval_promises,
 )
 from components.messages.reach import EVALUATE, Reach
-from components.navigation.errors import navigation_noise
-from components.sensor.ladder_values import measure_cells
+from components.navigation.errors import navigation_noise_deviations
+from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import check_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
-from components.surveillance.believed_line import OwnBelief, ned_to_body_angles, variances_in_body
+from components.surveillance.believed_line import (
+    OwnBelief,
+    line_of_sight_variances,
+    ned_to_azimuth_elevation_range,
+)
 from components.surveillance.broadcast import Altimeters, Transponders
 from components.surveillance.cooperative import (
     CooperativeParameters,
@@ -41,17 +45,17 @@ from components.surveillance.interrogation import (
     RANGE_ERROR_M,
     ROUND_S,
     ROUNDS,
-    answered_in_round,
+    answer_probability_per_round,
     bearing_deviation_rad,
-    is_near,
-    reach_m,
+    is_met_within,
     sine_of_elevation,
+    transponder_reach_m,
 )
 from components.surveillance.reports import empty_report_columns
 from components.surveillance.stated_errors import (
     ERRORS_OF_REPLIES,
     empty_error_columns,
-    variances_of_replies,
+    position_variances_of_replies_m2,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -113,17 +117,17 @@ class ActiveParameters(CooperativeParameters):
         return self
 
     def reach(self) -> Reach:
-        """Return the reach: the farthest answer's, where none is given."""
+        """Return the reach; without ``range_km`` up to the farthest range of any reply."""
         reach = super().reach()
         return reach if self.range_km is not None else replace(reach, range_max_m=_FARTHEST_M)
 
 
-def _answers(active: Any, cells: Cells) -> dict[str, FloatArray]:
+def _answer_probabilities(active: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return the probability of an answer of each cell if it is asked."""
     return {"answers": active.answer_probability(cells)}
 
 
-def _measurements(active: Any, cells: Cells) -> dict[str, FloatArray]:
+def _measured_ranges_and_altitudes(active: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return each cell's measured range and reported altitude, m."""
     every = np.arange(len(cells))
     return {
@@ -140,7 +144,7 @@ REPLIES = Ladder(
     ),
     "rounds",
     (Quantity("answers", ""),),
-    measure_cells(_answers),
+    make_cell_measure(_answer_probabilities),
 )
 MEASUREMENT = Ladder(
     "active measurement",
@@ -150,7 +154,7 @@ MEASUREMENT = Ladder(
     ),
     "do_365",
     (Quantity("range", "m"), Quantity("altitude", "m")),
-    measure_cells(_measurements),
+    make_cell_measure(_measured_ranges_and_altitudes),
 )
 
 
@@ -181,7 +185,9 @@ class Active(CooperativeSensor):
         self._errs = parameters.measurement != "exact"
 
     def offer(self, port: str) -> Any:
-        """Return the sensor's declaration: variances differ by answer, and range errors last."""
+        """Return what this sensor offers: variances that differ by reply, range and elevation
+        errors that last, and how often replies come.
+        """
         offer: SensorOffer = super().offer(port)
         period_s, every = float(1 / self.p.scan_rate_hz), self.p.far_every
         # The delay of a transponder and the error of an altimeter stay; of a range what is stated
@@ -196,7 +202,7 @@ class Active(CooperativeSensor):
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
-            promises=promises_of_looks(
+            promises=report_interval_promises(
                 period_s, [(math.inf, every * period_s)] if every > 1 else ()
             ),
             tells=self._errs, told_errors=ERRORS_OF_REPLIES if self._errs else (),
@@ -206,17 +212,19 @@ class Active(CooperativeSensor):
         """Return the probability that each cell's aircraft answers if it is asked."""
         every = np.arange(len(cells))
         seen = cells.range_m, cells.body_azimuth_rad
-        return self._answer_probability(cells, every, *seen, cells.state_ns)
+        return self._answer_probability_at(cells, every, *seen, cells.state_ns)
 
-    def _answer_probability(
+    def _answer_probability_at(
         self, cells: Cells, which: AnyArray, range_m: FloatArray, azimuth_rad: FloatArray,
         instant_ns: IntArray,
     ) -> FloatArray:  # fmt: skip
-        """Return the same of some cells, at ranges and bearings of some instant."""
+        """Return the probability of an answer for chosen cells, at the given ranges, bearings and
+        instants; 0 out of reach or without a transponder.
+        """
         equipage = cells.roster.equipage
         craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
         mode_s, mode_c = equipage.mode_s[craft], equipage.mode_c[craft]
-        within = range_m <= reach_m(azimuth_rad, mode_s)
+        within = range_m <= transponder_reach_m(azimuth_rad, mode_s)
         in_1_s = np.where(mode_s, self.p.mode_s_in_1_s, self.p.mode_c_in_1_s)
         if self.p.replies == "certain":
             in_1_s = np.ones(len(range_m))
@@ -227,11 +235,11 @@ class Active(CooperativeSensor):
         probability = self.answer_probability(cells)
         detected = probability > 0.0
         asked = np.flatnonzero(detected)
-        detected[asked] = self._is_asked(cells, asked)
+        detected[asked] = self._is_interrogated(cells, asked)
         asked = np.flatnonzero(detected)
         if self.p.replies == "rounds":
             instant_ns = cells.state_ns[asked]
-            detected[asked] = self._answer(cells, asked, probability[asked], instant_ns)
+            detected[asked] = self._has_recent_answer(cells, asked, probability[asked], instant_ns)
         answered = np.flatnonzero(detected)
         now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
         detected[answered] = placed = self.has_position(cells, answered, now)
@@ -241,13 +249,14 @@ class Active(CooperativeSensor):
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
-        detected = self.is_of_others(cells, detected, extras["address"])
+        detected = self.is_not_excluded_by_address(cells, detected, extras["address"])
         if len(answered):
-            extras["reported_climb_m_s"][answered] = self._climb(cells, answered, now)
+            extras["reported_climb_m_s"][answered] = self._reported_climb_m_s(cells, answered, now)
         return Look(detected, probability, extras)
 
-    def _is_asked(self, cells: Cells, which: AnyArray) -> BoolArray:
-        """Return which cells are asked at this scan: near or new ones, and others each in turn.
+    def _is_interrogated(self, cells: Cells, which: AnyArray) -> BoolArray:
+        """Return a mask over chosen cells: True where the aircraft is interrogated at this scan,
+        because it is near, new, or its turn has come.
 
         Near ones are known by the ranges measured at an aircraft's own last two turns, new ones by
         that it did not answer at one of them: it was not there, out of reach, or not heard.
@@ -255,7 +264,7 @@ class Active(CooperativeSensor):
         if self.p.far_every == 1 or not len(which):
             return np.ones(len(which), dtype=bool)
         every = self.p.far_every
-        turn = (cells.roster.keys_of(cells.target[which]) % np.uint64(every)).astype(np.int64)
+        turn = (cells.roster.draw_keys_of(cells.target[which]) % np.uint64(every)).astype(np.int64)
         due = (cells.scan[which] + turn) % every == 0
         rest = which[~due]
         if len(rest):
@@ -265,69 +274,78 @@ class Active(CooperativeSensor):
             for ago_s in (since_s, since_s + every * period_s):
                 then = cells.seen_at(rest, -ago_s)
                 instant_ns = cells.state_ns[rest] - np.rint(ago_s * NANOSECONDS).astype(np.int64)
-                known &= self._draw_answers(cells, rest, then, instant_ns)
-                ranges.append(self._range_errors(cells, rest, then["range_m"], instant_ns))
+                known &= self._has_answered_at(cells, rest, then, instant_ns)
+                ranges.append(self._add_range_errors(cells, rest, then["range_m"], instant_ns))
             rate = (ranges[0] - ranges[1]) / (every * period_s)
-            due[~due] = ~known | is_near(ranges[0] + rate * since_s, rate, self.p.near_s)
+            due[~due] = ~known | is_met_within(ranges[0] + rate * since_s, rate, self.p.near_s)
         return np.asarray(due)
 
-    def _draw_answers(
+    def _has_answered_at(
         self, cells: Cells, which: AnyArray, then: Any, instant_ns: IntArray
     ) -> BoolArray:
-        """Return which answered at a turn of theirs, as everything was `then`."""
+        """Return which cells answered at an earlier instant, with positions `then` (mask)."""
         azimuth, elevation = then["body_azimuth_rad"], then["body_elevation_rad"]
         there = then["present"] & (instant_ns >= 0)
         hidden = then.get("hidden")
-        reason = self._reach_from_body.decide(azimuth, elevation, then["range_m"], there, hidden)
+        reason = self._reach_in_body_axes.skip_reasons(
+            azimuth, elevation, then["range_m"], there, hidden
+        )
         seen = then["range_m"], azimuth
-        probability = self._answer_probability(cells, which, *seen, instant_ns)
+        probability = self._answer_probability_at(cells, which, *seen, instant_ns)
         heard = np.asarray((reason == EVALUATE) & (probability > 0.0))
         if self.p.replies == "rounds":
             some = np.flatnonzero(heard)
             now_ns = instant_ns[some]
-            heard[some] = self._answer(cells, which[some], probability[some], now_ns)
+            heard[some] = self._has_recent_answer(cells, which[some], probability[some], now_ns)
         return heard
 
-    def _answer(
+    def _has_recent_answer(
         self, cells: Cells, which: AnyArray, in_1_s: FloatArray, instant_ns: IntArray
     ) -> BoolArray:
-        """Return which answered in the ten rounds before; a run begins with ten that are over."""
+        """Return a mask over chosen cells: True where at least one of the last ten rounds (0.1 s
+        each) got an answer, drawn at random.
+        """
         last = instant_ns // round(ROUND_S * NANOSECONDS)
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
         run = np.repeat(cells.run[which], ROUNDS)
-        keys = np.repeat(cells.roster.keys_of(cells.target[which]), ROUNDS)
+        keys = np.repeat(cells.roster.draw_keys_of(cells.target[which]), ROUNDS)
         numbers = rounds.reshape(-1)
         over_ns = (numbers - ROUNDS) * round(ROUND_S * NANOSECONDS)
         drawn = self._answers.of_runs(run, over_ns).uniform(keys, numbers)
-        p = answered_in_round(in_1_s)[:, np.newaxis]
+        p = answer_probability_per_round(in_1_s)[:, np.newaxis]
         return np.asarray((drawn.reshape(rounds.shape) < p).any(axis=1))
 
     def reported_altitude_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
         """Return the altitudes that cells' transponders report for true altitudes, m."""
-        step_ft = self._mode_step_ft(cells, which) if self._errs else 0.0
+        step_ft = self._nominal_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.from_cells(cells, which)
-        altitude_m = self.altimeter_m(altitude_m)
-        return self._altimeters.reported_ft(transponders, altitude_m, step_ft, self._errs) * FOOT_M
+        altitude_m = self.pressure_altitude_m(altitude_m)
+        return (
+            self._altimeters.reported_altitude_ft(transponders, altitude_m, step_ft, self._errs)
+            * FOOT_M
+        )
 
-    def _climb(self, cells: Cells, detected: AnyArray, now_m: FloatArray) -> FloatArray:
-        """Return how fast reported altitudes changed in the last 5 s; NaN where none was then."""
+    def _reported_climb_m_s(
+        self, cells: Cells, detected: AnyArray, now_m: FloatArray
+    ) -> FloatArray:
+        """Return the reported mean climb over the last 5 s, m/s; NaN without a report 5 s ago."""
         then = cells.seen_at(detected, np.full(len(detected), -CLIMB_OVER_S))
         before_m = self.reported_altitude_m(cells, detected, then["alt_m"])
         known = then["present"] & (cells.state_ns[detected] >= CLIMB_OVER_S * NANOSECONDS)
         return np.where(known, (now_m - before_m) / CLIMB_OVER_S, np.nan)
 
     def measured_range_m(self, cells: Cells, which: AnyArray) -> FloatArray:
-        """Return the ranges that the answers of some cells come from, m."""
-        return self._range_errors(cells, which, cells.range_m[which], cells.state_ns[which])
+        """Return cells' measured range, m, with transponder delay and random error."""
+        return self._add_range_errors(cells, which, cells.range_m[which], cells.state_ns[which])
 
-    def _range_errors(
+    def _add_range_errors(
         self, cells: Cells, which: AnyArray, range_m: FloatArray, instant_ns: IntArray
     ) -> FloatArray:
         if not self._errs:
             return range_m
-        keys = cells.roster.keys_of(cells.target[which])
+        keys = cells.roster.draw_keys_of(cells.target[which])
         drawn = self._ranges(keys, instant_ns, run=cells.run[which])
         craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
         bias = np.where(cells.roster.equipage.mode_s[craft], *RANGE_BIAS_M)
@@ -346,29 +364,29 @@ class Active(CooperativeSensor):
         own = OwnBelief.from_cells(cells, detected)
         distance = self.measured_range_m(cells, detected)
         deviation = bearing_deviation_rad(elevation_rad) * float(self._errs)
-        keys, bearings = cells.roster.keys_of(cells.target[detected]), self._bearings
+        keys, bearings = cells.roster.draw_keys_of(cells.target[detected]), self._bearings
         bearings = bearings.of_runs(cells.run[detected], cells.instant_ns[detected])
         drawn = bearings.normal(keys, cells.scan[detected])
         # The bearing is off the nose; the altitude, and so the elevation, is of no axes.
         turned = own.yaw_rad - cells.own_attitude[0][detected]
         bearing = cells.azimuth_rad[detected] + turned + deviation * np.clip(drawn, -CUT, CUT)
         altitude = look.extras["reported_alt_m"][detected]
-        height = self.heights_m(cells, detected, altitude)
+        height = self.heights_from_altitudes_m(cells, detected, altitude)
         rise = sine_of_elevation(height - own.alt_m, distance)
         ground = np.sqrt(np.maximum(1.0 - rise**2, 0.0))
         ned = distance * np.stack([ground * np.cos(bearing), ground * np.sin(bearing), -rise])
-        azimuth, elevation, _ = ned_to_body_angles(own, ned)
+        azimuth, elevation, _ = ned_to_azimuth_elevation_range(own, ned)
         variances = (np.full(len(detected), _LEAST_M2),) * 3
         if self._errs:
-            position_m, attitude_rad = navigation_noise(self.context)
-            variances = variances_of_replies(
+            position_m, attitude_rad = navigation_noise_deviations(self.context)
+            variances = position_variances_of_replies_m2(
                 ned, deviation**2 + attitude_rad[0] ** 2, max(position_m[:2]) ** 2, altitude,
-                self._step_ft(cells, detected, altitude),
+                self._altitude_step_ft(cells, detected, altitude),
                 cells.roster.equipage.mode_s[cells.equipage_rows[detected]],
             )  # fmt: skip
         across, along, vertical = variances
         vertical = vertical + self.p.pressure_deviation_m**2
-        beside: dict[str, Any] = variances_in_body(own, ned, (across, along, vertical))
+        beside: dict[str, Any] = line_of_sight_variances(own, ned, (across, along, vertical))
         if self._errs:
             beside["told_by_target"] = self._error_deviations(cells, detected, altitude, deviation)
         return wrap_pi_unchecked(azimuth), elevation, distance, beside
@@ -376,13 +394,15 @@ class Active(CooperativeSensor):
     def _error_deviations(
         self, cells: Cells, detected: AnyArray, altitude_m: FloatArray, deviation: FloatArray
     ) -> dict[str, FloatArray]:
-        """Return the deviations of all errors, as `TOLD`."""
+        """Return the standard deviations of all errors of each reply, and the ownship's velocity,
+        by the column names in `TOLD`.
+        """
         none = np.zeros(len(detected))
         mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[detected]]
-        position_m, attitude_rad = navigation_noise(self.context)
+        position_m, attitude_rad = navigation_noise_deviations(self.context)
         own = own_velocity(cells, detected)
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
-        step_ft = self._step_ft(cells, detected, altitude_m)
+        step_ft = self._altitude_step_ft(cells, detected, altitude_m)
         return empty_error_columns(len(detected)) | {
             "own_north": own[0], "own_east": own[1], "own_down": own[2],
             "height_deviation": np.hypot(
@@ -395,9 +415,11 @@ class Active(CooperativeSensor):
             "white_variance": none + _WHITE_M2 + max(position_m) ** 2,
         }  # fmt: skip
 
-    def _step_ft(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
-        return altitude_step_ft(altitude_m / FOOT_M, self._mode_step_ft(cells, which))
+    def _altitude_step_ft(
+        self, cells: Cells, which: AnyArray, altitude_m: FloatArray
+    ) -> FloatArray:
+        return altitude_step_ft(altitude_m / FOOT_M, self._nominal_step_ft(cells, which))
 
-    def _mode_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
+    def _nominal_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
         mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)

@@ -10,25 +10,25 @@ from typing import Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
-from components.messages.detections import Detections, SensorOffer, promises_of_looks
+from components.messages.detections import Detections, SensorOffer, report_interval_promises
 from components.messages.reach import Reach
 from components.navigation.errors import displaced_position
-from components.sensor.ladder_values import measure_cells
+from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look
 from components.surveillance.believed_line import (
     OwnBelief,
-    ned_to_body_angles,
+    line_of_sight_variances,
+    ned_to_azimuth_elevation_range,
     relative_ned,
-    variances_in_body,
 )
 from components.surveillance.broadcast import (
     Broadcasts,
     Sent,
     Transponders,
-    rotate_velocity_to_later,
+    velocity_in_axes_of_later_position,
 )
 from components.surveillance.cooperative import (
     STEP_S,
@@ -42,7 +42,7 @@ from components.surveillance.reception import (
     AIRPORTS_AROUND,
     LAWS,
     fitted_reception_probability,
-    promises_by_range,
+    reception_time_steps,
 )
 from components.surveillance.reports import empty_report_columns
 from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
@@ -115,7 +115,7 @@ class AdsBParameters(CooperativeParameters):
         return self
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of a reception law that is not chosen."""
+        """Return a sentence per key without effect under the chosen reception law and heights."""
         said = super().ineffective_key_notes()
         if self.reception != "fitted":
             around = "aircraft_around", "airports_around"
@@ -125,7 +125,7 @@ class AdsBParameters(CooperativeParameters):
         return said
 
     def reach(self) -> Reach:
-        """Return the reach: that of the law of reception, where none is given."""
+        """Return the reach; without ``range_km`` up to the farthest of the reception law."""
         reach = super().reach()
         if self.range_km is not None:
             return reach
@@ -133,7 +133,9 @@ class AdsBParameters(CooperativeParameters):
 
 
 def _position_errors(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
-    """Return how far reports lie off what the aircraft are, north and east, m, at every look."""
+    """Return how far reported positions lie north and east of the aircraft's true positions at each
+    look, m, if every message is received.
+    """
     receiver.law = LAWS["certain"][0]
     look = receiver.look(cells)
     here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
@@ -153,7 +155,7 @@ RECEPTION = Ladder(
     ),
     "fitted",
     (Quantity("reception", ""),),
-    measure_cells(lambda receiver, cells: {"reception": receiver.law(cells.range_m)}),
+    make_cell_measure(lambda receiver, cells: {"reception": receiver.law(cells.range_m)}),
     clears=("range_km",),
 )
 ERRORS = Ladder(
@@ -170,7 +172,7 @@ ERRORS = Ladder(
     ),
     "gauss_markov",
     (Quantity("north", "m"), Quantity("east", "m")),
-    measure_cells(_position_errors),
+    make_cell_measure(_position_errors),
 )  # fmt: skip
 
 
@@ -225,53 +227,60 @@ class AdsB(CooperativeSensor):
         model = self.p.position_errors, self._is_geometric
         told = errors_of_broadcast(*model) if errs else ()
         # Of targets that may be anything some may be late.
-        late = [(one.equipage.late_s > 0.0).any() for one in known_targets(self.context)]
+        late = [
+            (one.equipage.uncompensated_latency_s > 0.0).any()
+            for one in offered_rosters(self.context)
+        ]
         told = (*told, LATE) if any(late or [True]) else told
         far_m = min(self.reach.range_max_m, LAWS[self.p.reception][1])
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
             lasting=lasting_errors(*model), unstated_across_m2=0.0,
-            promises=promises_of_looks(
-                float(1 / self.p.scan_rate_hz), promises_by_range(self.law, far_m)
+            promises=report_interval_promises(
+                float(1 / self.p.scan_rate_hz), reception_time_steps(self.law, far_m)
             ),
             tells=True, told_errors=told,
         )  # fmt: skip
 
     @property
     def steps(self) -> dict[str, float]:
-        """No quantity has a grid in the line of sight."""
+        """Grid steps of quantities as in other sensors, but 0 (no rounding) for range rate."""
         return {**super().steps, "range_rate": 0.0}
 
     def cells(self, targets: Any, rows: IntArray, wake: Wake) -> tuple[Cells, Any]:
-        """Return what all sensors have, and keep in mind when the scans before were."""
-        self._before_ns = nanosecond_of(wake.scans_before, wake.ticks_per_s)
+        """Return cells and reasons as every sensor does, and remember the instant of the scan
+        before each, from which on messages count.
+        """
+        self._before_ns = nanosecond_of(wake.previous_scan_tick, wake.ticks_per_s)
         return super().cells(targets, rows, wake)
 
     def look(self, cells: Cells) -> Look:
-        """Receive what was sent up to each scan, and decode the last of it."""
+        """Receive the messages sent since the last scan, decode the newest of each aircraft, and
+        return the look with the report columns.
+        """
         extras = empty_report_columns(len(cells))
         moves = np.full((3, len(cells)), np.nan)
         sends = np.flatnonzero(cells.roster.ever_broadcasts[cells.craft])
-        reported, number, sent_ns = self._last_received("position", cells, sends)
+        reported, number, sent_ns = self._newest_received_message("position", cells, sends)
         detected = np.zeros(len(cells), dtype=bool)
         detected[reported] = True
         if len(reported):
-            self._report(cells, reported, number, sent_ns, extras)
+            self._fill_report_columns(cells, reported, number, sent_ns, extras)
             taken = extras["reported_height_m" if self._is_geometric else "reported_alt_m"]
             placed = self.has_position(cells, reported, taken[reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
-            detected = self.is_of_others(cells, detected, extras["address"])
+            detected = self.is_not_excluded_by_address(cells, detected, extras["address"])
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, moves
         confidence = np.where(detected, extras["nacp"], 0.0)
         return Look(detected, confidence, extras, signal=signal)
 
-    def _last_received(
+    def _newest_received_message(
         self, kind: str, cells: Cells, asked: IntArray
     ) -> tuple[IntArray, IntArray, IntArray]:
-        """Return the cells of which a message was received, its number and when it was sent."""
+        """Return cells with such a message, and the newest's number and sending instant, ns."""
         none = np.zeros(0, dtype=np.int64)
         if not len(asked):
             return none, none, none
@@ -279,7 +288,7 @@ class AdsB(CooperativeSensor):
         oldest_ns = now_ns - self._max_message_age_ns(kind, cells, asked)
         count = math.ceil(int((now_ns - oldest_ns).max()) / (SHORTEST_S * NANOSECONDS)) + 1
         senders = Transponders.from_cells(cells, asked)
-        number, sent_ns, counts = self._clocks[kind].latest(
+        number, sent_ns, counts = self._clocks[kind].latest_messages(
             senders.keys, senders.run, now_ns, count
         )
         counts &= sent_ns > oldest_ns[:, np.newaxis]
@@ -303,14 +312,16 @@ class AdsB(CooperativeSensor):
         return asked[some], number[some, newest], sent_ns[some, newest]
 
     def _max_message_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
-        """Return how old a message may be that counts: a position came since the scan before."""
+        """Return the oldest age at which a message still counts, ns: for positions the time since
+        the last scan, for velocities a fixed age.
+        """
         if kind == "velocity":
             return np.full(len(asked), round(self.p.velocity_age_s * NANOSECONDS))
         # What delays the picture of the aircraft delays that of both scans.
         since_ns = cells.instant_ns[asked] - self._before_ns[cells.row[asked]]
         return np.minimum(since_ns, round(LONGEST_S * NANOSECONDS))
 
-    def _report(
+    def _fill_report_columns(
         self,
         cells: Cells,
         reported: IntArray,
@@ -318,32 +329,32 @@ class AdsB(CooperativeSensor):
         sent_ns: IntArray,
         extras: dict[str, AnyArray],
     ) -> None:
-        """Fill in what was decoded of some cells."""
+        """Fill cells' report columns in place: decoded position, velocity, quality categories."""
         equipage, senders = cells.roster.equipage, Transponders.from_cells(cells, reported, sent_ns)
         sent = self._states_when_sent(cells, reported, number, sent_ns)
-        position = self._broadcasts.position(equipage, senders, sent)
+        position = self._broadcasts.broadcast_position(equipage, senders, sent)
         for name, values in zip(POSITION_FIELDS, position, strict=True):
             extras[f"reported_{name}"][reported] = values
         extras["reported_s"][reported] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
             extras[name][reported] = getattr(equipage, name)[senders.craft]
-        moving, number, sent_ns = self._last_received("velocity", cells, reported)
+        moving, number, sent_ns = self._newest_received_message("velocity", cells, reported)
         if not len(moving):
             return
         senders = Transponders.from_cells(cells, moving, sent_ns)
         sent = self._states_when_sent(cells, moving, number, sent_ns)
-        velocity = self._broadcasts.velocity(equipage, senders, sent)
+        velocity = self._broadcasts.broadcast_velocity(equipage, senders, sent)
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
         extras["velocity_s"][moving] = sent_ns / NANOSECONDS
-        above_m = self._broadcasts.height_difference_m(equipage, senders, sent)
+        above_m = self._broadcasts.broadcast_height_difference_m(equipage, senders, sent)
         extras["reported_height_m"][moving] = extras["reported_alt_m"][moving] + above_m
         extras["nacv"][moving] = equipage.nacv[senders.craft]
 
     def _states_when_sent(
         self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray
     ) -> Sent:
-        """Return what was true when what messages say was measured.
+        """Return aircraft's true positions and velocities when message content was measured.
 
         Before a flight begins its aircraft flew on towards there as it is when the message is sent.
         """
@@ -364,7 +375,7 @@ class AdsB(CooperativeSensor):
             position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
         velocity[2] = -velocity[2]
         lat, lon, height = position
-        altitude = self.altimeter_m(height)
+        altitude = self.pressure_altitude_m(height)
         return Sent(lat, lon, altitude, height, velocity, number, instant_ns)
 
     def _measure(
@@ -376,7 +387,7 @@ class AdsB(CooperativeSensor):
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return lines of sight to what is reported, at the scan, and their variances."""
+        """Return azimuth, elevation, range of reports extrapolated to the scan, and variances."""
         said = {name: values[detected] for name, values in look.extras.items()}
         own = OwnBelief.from_cells(cells, detected)
         velocity = np.stack([
@@ -387,9 +398,9 @@ class AdsB(CooperativeSensor):
         lat, lon, altitude = (said[f"reported_{name}"] for name in POSITION_FIELDS)
         height = said["reported_height_m"]
         if not self._is_geometric:
-            height = self.heights_m(cells, detected, altitude)
+            height = self.heights_from_altitudes_m(cells, detected, altitude)
         position = [lat, lon, height]
-        velocity = rotate_velocity_to_later(
+        velocity = velocity_in_axes_of_later_position(
             position, velocity, said["reported_s"] - said["velocity_s"]
         )
         carried = np.nan_to_num(velocity)
@@ -397,7 +408,7 @@ class AdsB(CooperativeSensor):
         # Its velocity is in its own axes, which are turned against ours.
         ahead = relative_ned(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
-        azimuth, elevation, distance = ned_to_body_angles(own, ned)
+        azimuth, elevation, distance = ned_to_azimuth_elevation_range(own, ned)
         sent_ns = np.rint(said["reported_s"] * NANOSECONDS).astype(np.int64)
         roster = cells.roster
         stated = StatedByAircraft(
@@ -406,7 +417,7 @@ class AdsB(CooperativeSensor):
             pressure_deviation_m=self.p.pressure_deviation_m, is_geometric=self._is_geometric,
         )  # fmt: skip
         late_m = stated.late_s * np.nan_to_num(moving)
-        variances = variances_in_body(own, ned, stated.position_m2(age_s), late_m)
+        variances = line_of_sight_variances(own, ned, stated.position_variances_m2(age_s), late_m)
         moves = np.stack(
             [look.signal[f"own_{axis}"][detected] for axis in ("north", "east", "down")]
         )
@@ -414,7 +425,9 @@ class AdsB(CooperativeSensor):
         beside = {
             **variances,
             "range_rate_m_s": rate,
-            "range_rate_variance_m2_s2": np.where(np.isnan(rate), np.nan, stated.speed_m2_s2),
+            "range_rate_variance_m2_s2": np.where(
+                np.isnan(rate), np.nan, stated.speed_variance_m2_s2
+            ),
             "told_by_target": stated.velocities_and_errors(
                 moving, now_s - said["velocity_s"], age_s
             ),

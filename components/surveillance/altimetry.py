@@ -16,7 +16,7 @@ SHARE_OF_BETTER = np.array([0.391, 0.320, 0.345, 0.610, 0.610, 0.610])
 
 
 def standard_laplace(uniform: FloatArray) -> FloatArray:
-    """Return draws of mean 0 and scale 1, standard deviation sqrt 2, of uniform ones in [0, 1)."""
+    """Return Laplace draws (mean 0, scale 1), one for each uniform draw in [0, 1)."""
     # The upper half is the mirrored lower one, and no draw is infinite.
     off = uniform - 0.5
     return np.asarray(-np.sign(off) * np.log(np.maximum(1.0 - 2.0 * np.abs(off), 2.0**-53)))
@@ -25,7 +25,8 @@ def standard_laplace(uniform: FloatArray) -> FloatArray:
 def altimetry_error_ft(
     altitude_ft: FloatArray, laplace: FloatArray, kind: FloatArray
 ) -> FloatArray:
-    """Return the error of the altimeters of aircraft at altitudes, all (n,).
+    """Return altimetry errors in ft at altitudes (n,), from a Laplace draw and a uniform draw that
+    selects the kind of altimeter.
 
     ICAO's model (Annex 10, volume IV, 4.4.2.4; as RTCA DO-365 appendix Q has it): a Laplace
     distribution whose scale is that of the layer. An aircraft keeps its standard Laplace draw and
@@ -38,7 +39,7 @@ def altimetry_error_ft(
 
 
 def altimetry_variance_ft2(altitude_ft: FloatArray) -> FloatArray:
-    """Return the variance of the error at altitudes, over all altimeters."""
+    """Return altimetry error variances, ft², at altitudes, over better and other altimeters."""
     layer = np.searchsorted(LAYER_TOPS_FT, altitude_ft, side="left")
     share = SHARE_OF_BETTER[layer]
     return np.asarray(2.0 * (share * BETTER_FT[layer] ** 2 + (1.0 - share) * OTHER_FT[layer] ** 2))

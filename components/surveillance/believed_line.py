@@ -28,19 +28,19 @@ class OwnBelief:
 
     @classmethod
     def from_cells(cls, cells: Cells, which: IntArray) -> OwnBelief:
-        """Return the belief at some cells' scans."""
+        """Return the position and attitude that the ownship believes at chosen cells' scans."""
         return cls(*(cells.own_belief(name)[which] for name in cls.__annotations__))
 
     @property
     def attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Yaw, pitch and roll."""
+        """Believed yaw, pitch and roll in rad, each (n,)."""
         return self.yaw_rad, self.pitch_rad, self.roll_rad
 
 
 def relative_ned(
     own: OwnBelief, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
 ) -> FloatArray:
-    """Return north, east and down of positions from the ownship's believed one, (3, n), m."""
+    """Return positions relative to the believed own one, along north, east, down, (3, n), m."""
     return np.stack(
         line_of_sight_ned(
             own.lat_deg, own.lon_deg, own.alt_m, lat_deg, lon_deg, alt_m, validate=False
@@ -48,23 +48,23 @@ def relative_ned(
     )
 
 
-def ned_to_body_angles(
+def ned_to_azimuth_elevation_range(
     own: OwnBelief, ned: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return azimuth, elevation in body axes and range of north, east and down."""
+    """Return believed-body azimuth, elevation (rad) and range (m) of relative positions (3, n)."""
     body = ned_to_body_unchecked(ned[0], ned[1], ned[2], *own.attitude)
     azimuth, elevation = body_angles_unchecked(*body)
     range_m = np.maximum(np.sqrt((ned**2).sum(axis=0)), _NEAREST_M)
     return np.asarray(azimuth), np.asarray(elevation), range_m
 
 
-def variances_in_body(
+def line_of_sight_variances(
     own: OwnBelief,
     ned: FloatArray,
     variance: tuple[FloatArray, FloatArray, FloatArray],
     off_m: FloatArray | None = None,
 ) -> dict[str, FloatArray]:
-    """Return the variances of azimuth, elevation and range by column.
+    """Return body-axis variances of azimuth, elevation (rad²), range (m²), by column name.
 
     `variance` holds those of the position along three directions at right angles, m²: across the
     line of sight in the horizontal, along it in the horizontal, and vertical. `off_m` (3, n) is
@@ -79,7 +79,7 @@ def variances_in_body(
         np.stack(ned_to_body_unchecked(axis[0], axis[1], axis[2], *own.attitude))
         for axis in (side, ahead, np.stack([zero, zero, one]), *(() if off_m is None else (off_m,)))
     ]
-    azimuth, elevation, _ = ned_to_body_angles(own, ned)
+    azimuth, elevation, _ = ned_to_azimuth_elevation_range(own, ned)
     level = np.maximum(np.cos(elevation), _LEAST_COS)
     flat = np.cos(elevation)
     along = np.stack([np.cos(azimuth) * flat, np.sin(azimuth) * flat, -np.sin(elevation)])

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from components.aircraft.equipage import Equipage
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
-from components.geometry import NEAR_A_POLE_DEG, level_parts, rotate_to_meridian
+from components.geometry import NEAR_A_POLE_DEG, north_east_parts, rotate_to_meridian
 from components.navigation.errors import displaced_position
 from components.sensor.look import Cells
 from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
@@ -37,7 +37,7 @@ _OWNER = "[equipage]"
 
 @dataclass(frozen=True)
 class Transponders:
-    """Of some aircraft, (n,): draw keys, runs and indices in the roster's equipage."""
+    """Transponders of some aircraft, (n,): random number key, run, and row in equipage."""
 
     keys: npt.NDArray[np.uint64]
     run: IntArray
@@ -47,8 +47,10 @@ class Transponders:
     def from_cells(
         cls, cells: Cells, which: IntArray, instant_ns: IntArray | None = None
     ) -> Transponders:
-        """Return those of some cells' targets, by default as they are at the look."""
-        keys = cells.roster.keys_of(cells.target[which])
+        """Return the transponders of chosen cells' targets, with the equipage they have at
+        `instant_ns` or, by default, at the look.
+        """
+        keys = cells.roster.draw_keys_of(cells.target[which])
         craft = cells.equipage_rows[which]
         if instant_ns is not None:
             craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
@@ -56,19 +58,20 @@ class Transponders:
 
 
 class Altimeters:
-    """The altimeters of all aircraft."""
+    """Draws the altimeter errors of all aircraft, one per aircraft and run."""
 
     def __init__(self, streams: Streams) -> None:
         self._stream = streams.stream(_OWNER, "altimetry")
 
-    def reported_ft(
+    def reported_altitude_ft(
         self,
         transponders: Transponders,
         altitude_m: FloatArray,
         step_ft: npt.ArrayLike,
         errs: bool = True,
     ) -> FloatArray:
-        """Return reported altitudes, ft, by steps of 25 or 100 ft; 0 rounds nothing.
+        """Return the altitudes in ft that transponders report, with the altimeter's error and
+        rounded to `step_ft`; a step of 0 rounds nothing.
 
         NaN where no code has them.
         """
@@ -85,7 +88,7 @@ class Altimeters:
 
 @dataclass(frozen=True)
 class Sent:
-    """True states at the instants that messages are of, (n,): position, and velocity (3, n).
+    """True position and velocity of the sender at the instant for which each message holds.
 
     The altitude is what altimeters read there.
     """
@@ -100,7 +103,7 @@ class Sent:
 
 
 class Broadcasts:
-    """What aircraft send of what they are, with `errors` and `quantised` as in the messages.
+    """Simulates what aircraft broadcast: their true states with errors and rounding.
 
     Errors are ``none``, ``white`` (new with every message) or ``gauss_markov``: those of position
     and velocity then last `CORRELATION_TIME_S`.
@@ -116,7 +119,7 @@ class Broadcasts:
             name: GaussMarkov(stream, CORRELATION_TIME_S) for name, stream in self._streams.items()
         }
 
-    def level_errors(
+    def horizontal_errors(
         self,
         name: str,
         deviation: FloatArray,
@@ -126,7 +129,7 @@ class Broadcasts:
         lat_deg: npt.ArrayLike = 0.0,
         lon_deg: npt.ArrayLike = 0.0,
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the errors north and east of the position or the velocity at instants (n,).
+        """Return the north and east errors (n,) of broadcasts (m or m/s), scaled by `deviation`.
 
         They last along three axes that are fixed to the Earth: near a pole, where north turns
         about, the error does not.
@@ -141,20 +144,20 @@ class Broadcasts:
             # What is sent before the run begins is of instants before 0.
             draws = [self._lasting[name](keys, instant_ns, axis, run) for axis in range(3)]
         axis, sideways, outward = draws
-        north, east = level_parts(axis, sideways, outward, lat_deg, lon_deg)
+        north, east = north_east_parts(axis, sideways, outward, lat_deg, lon_deg)
         return deviation * north, deviation * east
 
     def _climb_errors(self, transponders: Transponders, message: IntArray) -> FloatArray:
-        """Return the errors of vertical rates, m/s, of messages (n,)."""
+        """Return each message's error of vertical rate, m/s, drawn from a Laplace distribution."""
         if self._errors == "none":
             return np.zeros(len(message))
         uniform = self._climbs.of_runs(transponders.run).uniform(transponders.keys, message)
         return CLIMB_SCALE_M_S * standard_laplace(uniform)
 
-    def height_difference_m(
+    def broadcast_height_difference_m(
         self, equipage: Equipage, transponders: Transponders, sent: Sent
     ) -> FloatArray:
-        """Return by how much geometric heights are said to be above pressure altitudes, (n,), m.
+        """Return the broadcast difference geometric height minus pressure altitude, m.
 
         NaN of who sends no geometric height, and where the code does not reach.
         """
@@ -163,20 +166,22 @@ class Broadcasts:
         if np.isnan(deviation).all():
             return deviation
         # Along one of the axes that errors last in; at the equator it is north.
-        error, _ = self.level_errors("height", deviation, *messages)
+        error, _ = self.horizontal_errors("height", deviation, *messages)
         error = np.where(np.isnan(deviation), np.nan, error)
         errs = self._errors != "none"
-        altitude = self._altimeters.reported_ft(transponders, sent.alt_m, 0.0, errs)
+        altitude = self._altimeters.reported_altitude_ft(transponders, sent.alt_m, 0.0, errs)
         difference = (sent.height_m + error) / FOOT_M - altitude
         if self._quantised:
             difference = quantised_difference_ft(difference)
         return np.asarray(difference * FOOT_M)
 
-    def velocity(self, equipage: Equipage, transponders: Transponders, sent: Sent) -> FloatArray:
-        """Return velocities north, east and up as decoded, (3, n), m/s."""
+    def broadcast_velocity(
+        self, equipage: Equipage, transponders: Transponders, sent: Sent
+    ) -> FloatArray:
+        """Return the decoded broadcast velocities along north, east and up, (3, n), m/s."""
         deviation = equipage.velocity_deviation_m_s[transponders.craft]
         messages = transponders, sent.message
-        level = self.level_errors(
+        level = self.horizontal_errors(
             "velocity", deviation, *messages, sent.instant_ns, sent.lat_deg, sent.lon_deg
         )
         moved = sent.north_east_up_m_s + np.stack([*level, self._climb_errors(*messages)])
@@ -195,12 +200,14 @@ class Broadcasts:
         self, equipage: Equipage, transponders: Transponders, sent: Sent, which: IntArray,
         moved: FloatArray,
     ) -> FloatArray:  # fmt: skip
-        """Return velocities in north and east of where aircraft believe to be."""
+        """Return velocities along the north and east of the position that each aircraft believes to
+        have, which near a pole differ from the true ones.
+        """
         some = Transponders(
             transponders.keys[which], transponders.run[which], transponders.craft[which]
         )
         true = sent.lat_deg[which], sent.lon_deg[which]
-        errors = self.level_errors(
+        errors = self.horizontal_errors(
             "position", equipage.position_deviation_m[some.craft], some, sent.message[which],
             sent.instant_ns[which], *true,
         )  # fmt: skip
@@ -208,29 +215,29 @@ class Broadcasts:
         lat, lon, _ = displaced_position(*true, sent.alt_m[which], *errors, none)
         return rotate_to_meridian(moved, true, (lat, lon))
 
-    def position(
+    def broadcast_position(
         self, equipage: Equipage, transponders: Transponders, sent: Sent
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return latitudes, longitudes and altitudes as decoded (deg, deg, m).
+        """Return the decoded broadcast latitudes, longitudes (deg) and altitudes (m).
 
         Latency is compensated by the aircraft's own velocity. An altitude that no code has is NaN.
         """
         craft = transponders.craft
         deviation = equipage.position_deviation_m[craft]
-        errors = self.level_errors(
+        errors = self.horizontal_errors(
             "position", deviation, transponders, sent.message, sent.instant_ns,
             sent.lat_deg, sent.lon_deg,
         )  # fmt: skip
         spoofed, ahead_s = equipage.spoofed_m[:, craft], equipage.compensated_s[craft]
         north, east, up = errors[0] + spoofed[0], errors[1] + spoofed[1], spoofed[2]
         if ahead_s.any():
-            moved = self.velocity(equipage, transponders, sent) * ahead_s
+            moved = self.broadcast_velocity(equipage, transponders, sent) * ahead_s
             north, east, up = north + moved[0], east + moved[1], up + moved[2]
         lat, lon, _ = displaced_position(
             sent.lat_deg, sent.lon_deg, sent.alt_m, north, east, np.zeros_like(north)
         )
         step_ft, errs = 25.0 if self._quantised else 0.0, self._errors != "none"
-        feet = self._altimeters.reported_ft(transponders, sent.alt_m + up, step_ft, errs)
+        feet = self._altimeters.reported_altitude_ft(transponders, sent.alt_m + up, step_ft, errs)
         if not self._quantised:
             return lat, lon, feet * FOOT_M
         odd: BoolArray = sent.message % 2 == 1
@@ -239,10 +246,11 @@ class Broadcasts:
         return lat, lon, feet * FOOT_M
 
 
-def rotate_velocity_to_later(
+def velocity_in_axes_of_later_position(
     position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
 ) -> FloatArray:
-    """Return velocities in the axes of positions that are later than they are, (3, n).
+    """Return velocities (3, n) along the north and east of the given positions, of velocities
+    measured `later_s` earlier along the path.
 
     North turns with the meridians, within a mile of a pole by degrees from message to message.
     """

@@ -31,7 +31,7 @@ _FEWER[0] = 87.0
 _RISING = _FEWER[::-1]
 
 
-def longitude_zones(lat_deg: npt.ArrayLike) -> IntArray:
+def number_of_longitude_zones(lat_deg: npt.ArrayLike) -> IntArray:
     """Return the number of zones of longitude at latitudes, 59 at the equator to 1 at the poles.
 
     At 87 degrees itself there are 2. The latitude of each change is that of the closed form.
@@ -44,7 +44,8 @@ def longitude_zones(lat_deg: npt.ArrayLike) -> IntArray:
 def encode(
     lat_deg: npt.ArrayLike, lon_deg: npt.ArrayLike, odd: npt.ArrayLike
 ) -> tuple[IntArray, IntArray]:
-    """Return the encoded latitude and longitude, 0 to 131071, of degrees on WGS 84.
+    """Return the CPR-encoded latitude and longitude, integers from 0 to 131071, of positions in
+    degrees; `odd` selects the odd format.
 
     `odd` says which format each report has. ValueError if a latitude lies beyond a pole or a number
     is not finite.
@@ -58,32 +59,32 @@ def encode(
     if not np.isfinite(lon).all():
         raise ValueError("lon_deg must be finite")
     height = _latitude_zone_deg(odd)
-    zone, share = _zone_of(lat, height)
+    zone, share = _zone_and_share(lat, height)
     y = np.floor(PARTS * share + 0.5)
     believed = height * (y / PARTS + zone)
     width = _longitude_zone_deg(believed, odd)
-    x = np.floor(PARTS * _zone_of(lon, width)[1] + 0.5)
+    x = np.floor(PARTS * _zone_and_share(lon, width)[1] + 0.5)
     return y.astype(np.int64) % PARTS, x.astype(np.int64) % PARTS
 
 
 def decode_near(
     y: IntArray, x: IntArray, odd: BoolArray, near_lat_deg: Any, near_lon_deg: Any
 ) -> tuple[FloatArray, FloatArray]:
-    """Return latitude and longitude in degrees of single reports, those nearest to places known.
+    """Return latitude and longitude (deg) of single CPR reports, nearest to a known position.
 
     Unambiguous within half a zone, 180 nmi, of the position; longitude in [-180, 180).
     """
     height = _latitude_zone_deg(odd)
-    lat = _nearest(y / PARTS, np.asarray(near_lat_deg, np.float64), height)
+    lat = _angle_nearest_to(y / PARTS, np.asarray(near_lat_deg, np.float64), height)
     width = _longitude_zone_deg(lat, odd)
-    lon = _nearest(x / PARTS, np.asarray(near_lon_deg, np.float64), width)
+    lon = _angle_nearest_to(x / PARTS, np.asarray(near_lon_deg, np.float64), width)
     return lat, _wrap_longitude(lon)
 
 
 def decode_pair(
     even: tuple[IntArray, IntArray], odd: tuple[IntArray, IntArray], odd_is_newer: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Return latitude and longitude of the newer of an even and an odd report, wherever it is.
+    """Return the latitude and longitude (deg) of the newer of an even and an odd CPR report.
 
     Reports are pairs of encoded latitude and longitude. NaN where the two lie on either side of a
     change of the number of zones, which no pair tells apart.
@@ -94,8 +95,10 @@ def decode_pair(
     lat0 = 6.0 * (np.mod(zone, 60) + y0 / PARTS)
     lat1 = 360.0 / 59.0 * (np.mod(zone, 59) + y1 / PARTS)
     lat0, lat1 = (np.where(lat >= 270.0, lat - 360.0, lat) for lat in (lat0, lat1))
-    zones = longitude_zones(lat0)
-    fits = (zones == longitude_zones(lat1)) & (np.abs(lat0) <= 90.0) & (np.abs(lat1) <= 90.0)
+    zones = number_of_longitude_zones(lat0)
+    fits = (
+        (zones == number_of_longitude_zones(lat1)) & (np.abs(lat0) <= 90.0) & (np.abs(lat1) <= 90.0)
+    )
     count = np.maximum(zones - newer, 1)
     zone = np.floor((x0 * (zones - 1) - x1 * zones) / PARTS + 0.5)
     lon = 360.0 / count * (np.mod(zone, count) + np.where(newer, x1, x0) / PARTS)
@@ -108,16 +111,18 @@ def _latitude_zone_deg(odd: BoolArray) -> FloatArray:
 
 
 def _longitude_zone_deg(lat_deg: FloatArray, odd: BoolArray) -> FloatArray:
-    return np.asarray(360.0 / np.maximum(longitude_zones(lat_deg) - odd, 1))
+    return np.asarray(360.0 / np.maximum(number_of_longitude_zones(lat_deg) - odd, 1))
 
 
-def _nearest(share: FloatArray, near: FloatArray, width: FloatArray) -> FloatArray:
-    zone, near_share = _zone_of(near, width)
+def _angle_nearest_to(share: FloatArray, near: FloatArray, width: FloatArray) -> FloatArray:
+    zone, near_share = _zone_and_share(near, width)
     return np.asarray(width * (zone + np.floor(0.5 + near_share - share) + share))
 
 
-def _zone_of(angle_deg: FloatArray, width_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the number of the zone that an angle lies in, and the share of it that it has gone."""
+def _zone_and_share(angle_deg: FloatArray, width_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the number of the zone of `width_deg` that each angle lies in, and the fraction of the
+    zone from its lower edge to the angle.
+    """
     zones = angle_deg / width_deg
     number = np.floor(zones)
     return number, zones - number

@@ -9,19 +9,19 @@ from typing import Any, ClassVar, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.atmosphere.pressure_altitude import Air, scene_air
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.reach import Reach
 from components.sensor.look import Cells
-from components.sensor.marks import COOPERATIVE
+from components.sensor.palette import COOPERATIVE
 from components.sensor.parameters import SensorParameters
 from components.sensor.sensor import Sensor
 from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.errors import Disagreements, did_you_mean
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
@@ -69,10 +69,10 @@ class CooperativeParameters(SensorParameters):
 
     @model_validator(mode="before")
     @classmethod
-    def _measures_no_angles(cls, given: Any) -> Any:
+    def _refuse_measurement_keys(cls, given: Any) -> Any:
         # Before the checks of sensors that measure, which would ask for more such keys.
         fields = SensorParameters.model_fields
-        Disagreements.refuse(
+        Disagreements.raise_if_any(
             [
                 f"{key} is given: a cooperative sensor has no axes and no grid of its own; "
                 "leave it out"
@@ -83,14 +83,14 @@ class CooperativeParameters(SensorParameters):
         return given
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key without effect, except keys that may not be given."""
+        """Return a sentence per key without effect, except keys that the sensor refuses anyway."""
         return [
             said for said in super().ineffective_key_notes() if not said.startswith(_MEASURED_KEYS)
         ]
 
 
 class CooperativeSensor(Sensor):
-    """A sensor of aircraft that say where they are, or answer; axes are the ownship's."""
+    """A sensor that receives what aircraft broadcast or answer; its axes are the ownship's."""
 
     mark = COOPERATIVE
     measures_range = True
@@ -108,20 +108,24 @@ class CooperativeSensor(Sensor):
 
     @cached_property
     def _air(self) -> Air | None:
-        """The atmosphere, where it is not the standard's."""
+        """The scene's atmosphere, or None if it is the standard one."""
         return scene_air(self.context.sections)
 
-    def altimeter_m(self, height_m: FloatArray) -> FloatArray:
-        """Return altimeter readings at heights without the instruments' errors, m."""
+    def pressure_altitude_m(self, height_m: FloatArray) -> FloatArray:
+        """Return pressure altitude (m) without errors: the height in the standard atmosphere."""
         if self._air is None:
             return height_m
         return np.asarray(self._air.pressure_altitude_m(height_m))
 
-    def heights_m(self, cells: Cells, which: AnyArray, altitude_m: FloatArray) -> FloatArray:
-        """Return the heights that reported pressure altitudes of some cells are interpreted as."""
+    def heights_from_altitudes_m(
+        self, cells: Cells, which: AnyArray, altitude_m: FloatArray
+    ) -> FloatArray:
+        """Return the heights (m) that the receiver assigns to reported pressure altitudes: as
+        reported, or relative to the ownship's own altimeter.
+        """
         if self.p.heights == "reported":
             return altitude_m
-        own_m = self.altimeter_m(cells.of_row("own_alt_m")[which])
+        own_m = self.pressure_altitude_m(cells.of_row("own_alt_m")[which])
         return altitude_m - (own_m - cells.own_belief("alt_m")[which])
 
     def _note_pressure_heights(self) -> list[str]:
@@ -129,7 +133,7 @@ class CooperativeSensor(Sensor):
         if self._air is None or self.p.heights == "geometric":
             return []
         at_m = np.array([0.0, 1000.0, 1300.0, 3000.0])
-        low_m, here_m, above_m, high_m = self.altimeter_m(at_m) - at_m
+        low_m, here_m, above_m, high_m = self.pressure_altitude_m(at_m) - at_m
         stated, left_m = self.p.pressure_deviation_m, above_m - here_m
         told = f"stated with a deviation of {stated:g} m" if stated else "nobody is told"
         if self.p.heights == "by_own_altimeter":
@@ -143,8 +147,10 @@ class CooperativeSensor(Sensor):
         ]
 
     def warnings(self) -> list[str]:
-        """Return warnings on targets without equipment, and on which heights are compared."""
-        rosters = known_targets(self.context)
+        """Return a warning if no target has equipment that this sensor receives, and a note on how
+        pressure altitudes are used as heights.
+        """
+        rosters = offered_rosters(self.context)
         heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
         said = [*super().warnings(), *self._note_pressure_heights()]
         if not rosters or any(heard):
@@ -157,43 +163,49 @@ class CooperativeSensor(Sensor):
         self._unplaced = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how many received aircraft sent no altitude, and so have no position, by run."""
+        """Return, by message, receptions per run from aircraft that sent no altitude."""
         return {**super().failure_counts(), NO_CODE: self._unplaced}
 
     def setup(self) -> None:
         """Refuse to leave out whom there is not."""
         super().setup()
-        names = [name for roster in known_targets(self.context) for name in roster.names]
+        names = [name for roster in offered_rosters(self.context) for name in roster.names]
         for name in self.p.leaves_out if names else ():
             if name not in names:
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
-    def is_of_others(self, cells: Cells, heard: BoolArray, address: IntArray) -> BoolArray:
-        """Return which received cells are not of an aircraft that is left out by its address."""
+    def is_not_excluded_by_address(
+        self, cells: Cells, heard: BoolArray, address: IntArray
+    ) -> BoolArray:
+        """Return a mask over cells: True where a message was received and the address is not one of
+        the aircraft to leave out.
+        """
         roster = cells.roster
         for name in self.p.leaves_out:
             craft = np.full(len(cells), roster.names.index(name))
-            craft = craft if roster.is_shared else roster.craft(craft, cells.run)
+            craft = (
+                craft if roster.is_same_in_all_replicas else roster.aircraft_index(craft, cells.run)
+            )
             heard = heard & (address != roster.equipage.address[craft])
         return heard
 
     def has_position(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
-        """Return which received cells have a position: one without an altitude has none.
+        """Return which received cells have an altitude, so a position; count the others (mask).
 
         An altitude that no code has is not available (NaN).
         """
         there = np.isfinite(altitude_m)
         run = cells.run[heard]
-        self._unplaced = count_cases(self._unplaced, run[~there], run)
+        self._unplaced = add_cases(self._unplaced, run[~there], run)
         return there
 
     @cached_property
-    def _reach_from_body(self) -> Reach:
+    def _reach_in_body_axes(self) -> Reach:
         return self.reach
 
 
 def own_velocity(cells: Cells, which: IntArray) -> FloatArray:
-    """Return the ownship's velocity at some cells, north, east and down (3, n)."""
+    """Return the ownship's true velocity (north, east, down), (3, n), m/s, at cells' instants."""
     now = np.zeros(len(which))
     return velocity_of(cells, which, now, cells.seen_at(which, now), "own")
 
@@ -201,7 +213,9 @@ def own_velocity(cells: Cells, which: IntArray) -> FloatArray:
 def velocity_of(
     cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
 ) -> FloatArray:
-    """Return velocities north, east and down (3, n), from positions 1/64 s before and after."""
+    """Return the velocity along north, east and down, (3, n), m/s, of the ownship or the targets,
+    from their positions 1/64 s before and after.
+    """
     positions = [here[f"{whose}_{name}"] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(which))
     for step_s in (-STEP_S, STEP_S):

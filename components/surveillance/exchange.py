@@ -5,16 +5,16 @@ import math
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 from dsa_des.time.clock import nanosecond_of
 from dsa_des.time.randomness import target_keys
 
@@ -36,7 +36,8 @@ class ExchangeParameters(ClockedParameters):
 
 
 class PositionExchange(Component):
-    """Hears the fixes of all others at each scan, at once and without loss, and has its own.
+    """Receives the position and velocity of all other aircraft at each scan, without delay or loss,
+    each with that aircraft's own errors.
 
     Every aircraft fixes itself with errors of its own, new at each instant and the same to all who
     hear it; one's own fix errs like that which is broadcast. No level is judged: whoever acts on
@@ -52,7 +53,7 @@ class PositionExchange(Component):
     rewindable = True
 
     def request(self, port: str) -> FarthestLook:
-        """Return a request for all targets with their flights, for velocities."""
+        """Return a request for all targets at any range, known also shortly after each instant."""
         return FarthestLook(math.inf, lasts_s=_STEP_S)
 
     def setup(self) -> None:
@@ -62,13 +63,13 @@ class PositionExchange(Component):
         self._still = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often nothing moved as far as is known, as behind an FMU that flies."""
+        """Return, by message, the instants per run at which unknown velocities barred reception."""
         what = "no flights are known beside the positions: nobody has a velocity and is heard"
         return {what: self._still}
 
     def warnings(self) -> list[str]:
-        """Warn that no other aircraft exchanges positions."""
-        rosters = known_targets(self.context)
+        """Return a warning if the scene has no other aircraft whose position is received."""
+        rosters = offered_rosters(self.context)
         alone = rosters and not any(map(len, rosters))
         return ["nobody else flies: it hears of nobody"] if alone else []
 
@@ -77,19 +78,21 @@ class PositionExchange(Component):
         states: TrafficStates | None = wake["states"]
         if states is None:
             return None
-        self._still = count_cases(
+        self._still = add_cases(
             self._still, wake.run[: len(wake) if states.flights is None else 0], wake.run
         )
         if states.flights is None:
             return None
-        fixes = states.flights.once(
+        fixes = states.flights.compute_once(
             f"fixes {self.p.position_m} {self.p.velocity_mps}",
             (wake.ticks, wake.run, states.tick, states.columns, states.flights.known),
-            lambda: self._fixes(wake, states),
+            lambda: self._velocities_and_fix_errors(wake, states),
         )
-        (own_mps, velocity), *errors = (_split(part, _place(states)) for part in fixes)
-        own, targets = _positions(states)
-        position, relative = _way(own[:, :, np.newaxis], targets), velocity - own_mps
+        (own_mps, velocity), *errors = (
+            _split_viewer_from_others(part, _viewer_index(states)) for part in fixes
+        )
+        own, targets = _viewer_and_other_positions(states)
+        position, relative = _east_north_up_m(own[:, :, np.newaxis], targets), velocity - own_mps
         for part, (mine, theirs) in zip((position, relative), errors, strict=True):
             part[:2] += theirs - mine
             part[2] += 0.0
@@ -111,7 +114,7 @@ class PositionExchange(Component):
         names = ("east_m", "north_m", "up_m", "east_mps", "north_mps", "climb_mps")
         return AlertLevels(
             wake.ticks,
-            offsets_of(row, len(wake)),
+            offsets_from_entry_rows(row, len(wake)),
             target,
             np.zeros(len(row), dtype=np.int64),
             {},
@@ -128,15 +131,16 @@ class PositionExchange(Component):
             states.roster,
         )
 
-    def _fixes(self, wake: Wake, states: TrafficStates) -> list[FloatArray]:
-        """Return velocities of everybody (3, rows, aircraft), and errors of their fixes.
+    def _velocities_and_fix_errors(self, wake: Wake, states: TrafficStates) -> list[FloatArray]:
+        """Return true velocities (3, rows, aircraft; ownship first) and the errors of position and
+        of velocity of every aircraft.
 
         The ownship is the first whoever looks.
         """
         assert states.flights is not None
-        own, targets = _positions(states)
+        own, targets = _viewer_and_other_positions(states)
         here = np.concatenate([own[:, :, np.newaxis], targets], axis=2)
-        viewer = _place(states)
+        viewer = _viewer_index(states)
         here[:, :, [0, viewer]] = here[:, :, [viewer, 0]]
         flights = states.flights.seen_from(-1)
         later = flights(states.columns, (wake.time_s + _STEP_S)[:, np.newaxis])
@@ -145,9 +149,9 @@ class PositionExchange(Component):
         )
         roster, viewer = states.roster, states.flights.viewer
         roster = roster if viewer < 0 else roster.seen_from(viewer)
-        keys = np.append(target_keys((roster.own_name,)), roster.keys_of(states.columns))
+        keys = np.append(target_keys((roster.own_name,)), roster.draw_keys_of(states.columns))
         keys = np.broadcast_to(keys, here.shape[1:])
-        return [_way(here, there) / _STEP_S, *self._fix_errors(wake, keys)]
+        return [_east_north_up_m(here, there) / _STEP_S, *self._fix_errors(wake, keys)]
 
     def _fix_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
         """Return errors of position and of velocity, (2, rows, aircraft) each: east and north."""
@@ -164,15 +168,15 @@ class PositionExchange(Component):
         ]  # fmt: skip
 
 
-def _place(states: TrafficStates) -> int:
-    """Return the place of who looks among everybody, the ownship first."""
+def _viewer_index(states: TrafficStates) -> int:
+    """Return the index of the viewing platform among all aircraft, where 0 is the ownship."""
     assert states.flights is not None
     viewer = states.flights.viewer
     return 0 if viewer < 0 else int(np.searchsorted(states.columns, viewer)) + 1
 
 
-def _positions(states: TrafficStates) -> tuple[FloatArray, FloatArray]:
-    """Return positions of who looks (3, rows), and of the others (3, rows, targets)."""
+def _viewer_and_other_positions(states: TrafficStates) -> tuple[FloatArray, FloatArray]:
+    """Return the viewer's latitude, longitude, altitude (3, rows), others' (3, rows, targets)."""
     own, targets = (
         np.stack([getattr(states, f"{of}{name}") for name in POSITION_FIELDS])
         for of in ("own_", "")
@@ -180,15 +184,15 @@ def _positions(states: TrafficStates) -> tuple[FloatArray, FloatArray]:
     return own, targets
 
 
-def _split(everybody: FloatArray, viewer: int) -> tuple[FloatArray, FloatArray]:
-    """Return what is of who looks (..., 1), and of the others, the ownship in its place."""
+def _split_viewer_from_others(everybody: FloatArray, viewer: int) -> tuple[FloatArray, FloatArray]:
+    """Return the viewer's values (..., 1), and all others', the ownship in the viewer's place."""
     others = everybody[:, :, 1:].copy()
     if viewer:
         others[:, :, viewer - 1] = everybody[:, :, 0]
     return everybody[:, :, viewer : viewer + 1].copy(), others
 
 
-def _way(here: FloatArray, there: FloatArray) -> FloatArray:
-    """Return the way from places to others, east, north and up of the first, m."""
+def _east_north_up_m(here: FloatArray, there: FloatArray) -> FloatArray:
+    """Return the displacement from positions to others, along the first's east, north, up, m."""
     north, east, down = line_of_sight_ned(*here, *there, validate=False)
     return np.stack(np.broadcast_arrays(east, north, -down))

@@ -38,8 +38,8 @@ _TYPE_CODES, _SUPPLEMENTS = (
 _VELOCITY_TYPE = 19
 
 
-def parity(messages: Bytes) -> IntArray:
-    """Return the 24 bits of parity of messages, (n, 14) or (n, 11) bytes; the last 3 do not count.
+def parity_bits(messages: Bytes) -> IntArray:
+    """Return each message's 24 parity bits, as an integer, from its first 11 bytes.
 
     0 for the whole of a message whose last three bytes are its parity, see `is_intact`.
     """
@@ -53,7 +53,7 @@ def parity(messages: Bytes) -> IntArray:
 
 def is_intact(messages: Bytes) -> BoolArray:
     """Return whether each message ends in its parity."""
-    return np.asarray(parity(messages) == _field(messages, _WITHOUT_PARITY, 24))
+    return np.asarray(parity_bits(messages) == _field(messages, _WITHOUT_PARITY, 24))
 
 
 def quantised_altitude_ft(altitude_ft: npt.ArrayLike, step_ft: npt.ArrayLike = 25) -> FloatArray:
@@ -69,7 +69,7 @@ def quantised_altitude_ft(altitude_ft: npt.ArrayLike, step_ft: npt.ArrayLike = 2
 
 
 def quantised_difference_ft(difference_ft: FloatArray) -> FloatArray:
-    """Return by how much geometric heights are above pressure altitudes, in steps of 25 ft.
+    """Return geometric minus pressure altitude, ft, in steps of 25 as velocity messages have it.
 
     NaN where the code holds no such difference, above 3,137.5 ft either way.
     """
@@ -78,7 +78,7 @@ def quantised_difference_ft(difference_ft: FloatArray) -> FloatArray:
 
 
 def altitude_step_ft(altitude_ft: FloatArray, step_ft: npt.ArrayLike) -> FloatArray:
-    """Return the step that altitudes are reported in: 100 ft where no code of 25 ft has them."""
+    """Return each altitude's step: `step_ft` where the 25 ft code covers it, else >= 100 ft."""
     half = 0.5 * ALTITUDE_STEP_FT
     fine = (altitude_ft >= LOWEST_FT - half) & (altitude_ft < HIGHEST_FT + half)
     return np.where(fine, step_ft, np.maximum(step_ft, GILLHAM_STEP_FT))
@@ -87,7 +87,7 @@ def altitude_step_ft(altitude_ft: FloatArray, step_ft: npt.ArrayLike) -> FloatAr
 def quantised_velocity_kt(
     north_kt: npt.ArrayLike, east_kt: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Return both parts of velocities in whole knots, or in steps of 4 where one is that fast.
+    """Return north, east velocity rounded as sent: to 1 kt, or 4 kt if a component is too fast.
 
     From 1021.5 kt on in either part the supersonic subtype is sent, whose largest part is 4088 kt.
     """
@@ -102,13 +102,13 @@ def quantised_velocity_kt(
 
 
 def speed_step_kt(north_kt: npt.ArrayLike, east_kt: npt.ArrayLike) -> FloatArray:
-    """Return the step of both parts of velocities, 1 or 4 kt."""
+    """Return the step of both velocity components, 1 kt, or 4 kt where one is too fast for that."""
     fastest = np.maximum(np.abs(north_kt), np.abs(east_kt))
     return np.where(fastest >= _FASTEST_KT - 0.5, float(_SUPERSONIC), float(SPEED_STEP_KT))
 
 
 def quantised_climb_ft_min(climb_ft_min: npt.ArrayLike) -> FloatArray:
-    """Return vertical rates in whole steps of 64 ft/min, at most 510 of them."""
+    """Return climb rates, ft/min, rounded to multiples of 64 as sent, at most ±510 steps."""
     steps = np.minimum(np.floor(np.abs(climb_ft_min) / CLIMB_STEP_FT_MIN + 0.5), _STEEPEST)
     return np.asarray(np.copysign(steps * CLIMB_STEP_FT_MIN, climb_ft_min))
 
@@ -190,7 +190,7 @@ def velocity_messages(
 
 @dataclass(frozen=True)
 class PositionFields:
-    """What position messages hold, (n,) each: encoded position, altitude, and categories."""
+    """Decoded airborne position message fields, (n,) each: encoded position, altitude, quality."""
 
     address: IntArray
     nic: IntArray
@@ -250,7 +250,7 @@ def _gillham(altitude_ft: FloatArray) -> IntArray:
 
 
 def _gillham_altitude_ft(bits: IntArray) -> FloatArray:
-    """Return the altitudes of 12 bits in Gillham's code, ft."""
+    """Return the altitudes in ft that 12-bit Gillham codes stand for."""
     coarse, rest = np.zeros_like(bits), np.zeros_like(bits)
     for number, places in ((coarse, _OF_500), (rest, _OF_100)):
         last = np.zeros_like(bits)
@@ -281,7 +281,7 @@ def _squitters(address: FloatArray, fields: list[tuple[npt.ArrayLike, int]]) -> 
         bits[:, first : first + count] = whole[:, np.newaxis] >> np.arange(count)[::-1] & 1
         first += count
     messages = np.packbits(bits, axis=1)
-    rest = parity(messages)
+    rest = parity_bits(messages)
     for index, shift in ((11, 16), (12, 8), (13, 0)):
         messages[:, index] = rest >> shift & 0xFF
     return messages

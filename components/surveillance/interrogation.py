@@ -26,31 +26,31 @@ RANGE_BIAS_M = (125.0 * FOOT_M, 250.0 * FOOT_M)
 RANGE_ERROR_M, RANGE_CORRELATION_S = 50.0 * FOOT_M, 1.0
 
 
-def reach_m(bearing_rad: FloatArray, mode_s: BoolArray) -> FloatArray:
-    """Return how far transponders answer that lie at bearings (from the nose, in [-pi, pi]), m."""
+def transponder_reach_m(bearing_rad: FloatArray, mode_s: BoolArray) -> FloatArray:
+    """Return a Mode S or C transponder's reach (m) at bearings from the nose, in [-pi, pi]."""
     off = np.abs(bearing_rad)
     ahead, side, behind = MODE_C_REACH_M
     mode_c = np.where(off <= AHEAD_RAD, ahead, np.where(off <= SIDE_RAD, side, behind))
     return np.where(mode_s, MODE_S_REACH_M, mode_c)
 
 
-def answered_in_round(in_1_s: FloatArray) -> FloatArray:
-    """Return the probability of an answer in one round, of that in the ten rounds of 1 s."""
+def answer_probability_per_round(in_1_s: FloatArray) -> FloatArray:
+    """Return the chance of an answer in one round, given that in the ten rounds of a second."""
     return np.asarray(1.0 - (1.0 - in_1_s) ** (1.0 / ROUNDS))
 
 
 def bearing_deviation_rad(elevation_rad: FloatArray) -> FloatArray:
-    """Return standard deviations of bearings by the elevation above the antenna's plane."""
+    """Return the bearing's standard deviation, rad, larger at steep elevations up or down."""
     return np.where(np.abs(elevation_rad) <= LEVEL_RAD, *BEARING_RAD)
 
 
-def is_near(range_m: FloatArray, range_rate_m_s: FloatArray, within_s: float) -> BoolArray:
-    """Return which aircraft would, by range over its rate, be met within a time."""
+def is_met_within(range_m: FloatArray, range_rate_m_s: FloatArray, within_s: float) -> BoolArray:
+    """Return which aircraft approach with range / closing speed at most `within_s` (mask)."""
     return np.asarray((range_rate_m_s < 0.0) & (range_m <= -range_rate_m_s * within_s))
 
 
 def sine_of_elevation(above_m: FloatArray, range_m: FloatArray) -> FloatArray:
-    """Return the sine of the elevation of aircraft so far above and away, over a round Earth."""
+    """Return the sine of elevation to `above_m` higher at `range_m` (slant), on a curved Earth."""
     share = np.clip(above_m / range_m, -1.0, 1.0)
     sagging = range_m / (2.0 * 6_371_000.0) * (1.0 - share**2)
     return np.asarray(np.clip(share - sagging, -1.0, 1.0))

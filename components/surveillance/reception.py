@@ -32,7 +32,7 @@ _PROMISED_RANGES = 40
 def fitted_reception_probability(
     range_m: FloatArray, aircraft: float = AIRCRAFT_AROUND, airports: float = AIRPORTS_AROUND
 ) -> FloatArray:
-    """Return the probability that a receiver on the ground receives a message.
+    """Return a ground receiver's probability of one message by range, by a law fitted to data.
 
     ``p = exp(-3 x²) (1 + a₁ x + a₂ x² + a₃ x³ + a₄ x⁴)`` with x the range over that of the farthest
     message received, 290 nmi, cut at 0 and 1, and 0 beyond: the form of Nakagami fading in which
@@ -53,7 +53,7 @@ def fitted_reception_probability(
 
 
 def do_365_reception_probability(range_m: FloatArray) -> FloatArray:
-    """Return the probability of one of two messages a second by RTCA DO-365, appendix Q.
+    """Return each range's chance to receive one message (two a second), DO-365, appendix Q.
 
     A report comes within 3 s with 95 % up to 10 nmi, within 7 s up to 20 nmi, and never beyond.
     """
@@ -63,17 +63,19 @@ def do_365_reception_probability(range_m: FloatArray) -> FloatArray:
 
 
 def time_to_receive_s(probability: FloatArray) -> FloatArray:
-    """Return in which time one of two messages a second has come 19 times in 20, s; 60 at most."""
+    """Return the time (s, at most 60) to receive a message with 95 %, for two messages a second."""
     missed = np.log1p(-np.clip(probability, 1e-9, 1.0 - 1e-9))
     messages = np.maximum(np.ceil(np.log(0.05) / missed - 1e-6), 1.0)
     # Messages are up to 0.6 s apart, and a tracker heeds a look a tenth of the time before it.
     return np.minimum(messages / _PER_SECOND + 0.2, 60.0)
 
 
-def promises_by_range(
+def reception_time_steps(
     law: Callable[[FloatArray], FloatArray], reach_m: float
 ) -> list[tuple[float, float]]:
-    """Return up to which range an aircraft's next position has come in which time, m and s."""
+    """Return steps (range in m, time in s): up to this range, the next position of an aircraft is
+    received within this time in 19 of 20 cases.
+    """
     ranges_m = np.array([np.inf])
     if np.isfinite(reach_m):
         ranges_m = np.linspace(0.0, reach_m, _PROMISED_RANGES + 1)[1:]
@@ -81,14 +83,14 @@ def promises_by_range(
     return list(zip(ranges_m.tolist(), within_s.tolist(), strict=True))
 
 
-def certain(range_m: FloatArray) -> FloatArray:
-    """Return 1 at any range."""
+def certain_reception_probability(range_m: FloatArray) -> FloatArray:
+    """Return 1 for every range: all messages are received."""
     return np.ones_like(range_m, dtype=np.float64)
 
 
 #: By name, with the range at which each law ends.
 LAWS: dict[str, tuple[Callable[[FloatArray], FloatArray], float]] = {
-    "certain": (certain, np.inf),
+    "certain": (certain_reception_probability, np.inf),
     "do_365": (do_365_reception_probability, DO_365_RANGES_M[1]),
     "fitted": (fitted_reception_probability, FITTED_RANGE_M),
 }

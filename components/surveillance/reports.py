@@ -45,7 +45,7 @@ class CooperativeReports(Detections):
 
 
 def empty_report_columns(count: int) -> dict[str, AnyArray]:
-    """Return the columns of reports that say nothing."""
+    """Return the report columns of `count` cells without reception: integers -1, others NaN."""
     return {
         name: np.full(count, -1) if name in _WHOLE else np.full(count, np.nan) for name in REPORTED
     }

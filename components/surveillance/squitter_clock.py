@@ -26,13 +26,13 @@ _LONGEST_NS = 0.6 * NANOSECONDS
 _SHORTEST_NS, _SPREAD_NS = 0.4 * NANOSECONDS, 0.2 * NANOSECONDS
 
 
-def interval_ns(uniform: FloatArray) -> IntArray:
-    """Return intervals of uniform draws, whole nanoseconds."""
+def message_intervals_ns(uniform: FloatArray) -> IntArray:
+    """Return random intervals between messages in whole ns, one for each uniform draw."""
     return np.asarray(np.rint(_SHORTEST_NS + _SPREAD_NS * uniform), dtype=np.int64)
 
 
 def first_message_ns(uniform: FloatArray, share: FloatArray) -> IntArray:
-    """Return when the first message is sent of clocks that have run for ever.
+    """Return the instant, ns, of a run's first message for clocks that have run for long.
 
     The interval that a given instant lies in is longer than others, by its length; the instant lies
     anywhere in it.
@@ -43,17 +43,18 @@ def first_message_ns(uniform: FloatArray, share: FloatArray) -> IntArray:
 
 
 class SquitterClocks:
-    """The clocks of one kind of message of all aircraft, by a stream that nothing else uses."""
+    """Random sending instants of one kind of message, reproducible by run and aircraft."""
 
     def __init__(self, stream: Stream) -> None:
         self._stream = stream
         #: When the first message of each chunk is sent, by draw key and run, ns.
         self._starts: dict[tuple[int, int], array[int]] = {}
 
-    def latest(
+    def latest_messages(
         self, keys: npt.NDArray[np.uint64], run: IntArray, until_ns: IntArray, count: int
     ) -> tuple[IntArray, IntArray, BoolArray]:
-        """Return the last `count` messages, at most 16, that each aircraft sent up to an instant.
+        """Return number, sending instant (ns) and existence of the last `count` messages (at most
+        16) that each aircraft sent up to an instant.
 
         Aircraft are given by draw key and run, (n,). Numbers and instants in ns of the run,
         (n, count), are newest first, with whether there was one since the start of the run.
@@ -67,7 +68,7 @@ class SquitterClocks:
             chunk = max(bisect_right(starts, until) - 2, 0)
             first[cell], start_ns[cell] = chunk * _CHUNK, starts[chunk]
         numbers = first[:, np.newaxis] + np.arange(2 * _CHUNK)
-        instants = self._instants(keys, run, start_ns, numbers)
+        instants = self._sending_instants_ns(keys, run, start_ns, numbers)
         newest = (instants <= until_ns[:, np.newaxis]).sum(axis=1) - 1
         index = newest[:, np.newaxis] - np.arange(count)
         sent: BoolArray = index >= 0
@@ -78,23 +79,23 @@ class SquitterClocks:
             sent,
         )
 
-    def _instants(
+    def _sending_instants_ns(
         self,
         keys: npt.NDArray[np.uint64],
         run: IntArray,
         start_ns: IntArray,
         numbers: IntArray,
     ) -> IntArray:
-        """Return when messages (n, m) in a row are sent, of which the first is at `start_ns`."""
+        """Return consecutive messages' sending instants (n, m), ns, the first at `start_ns`."""
         later = numbers[:, 1:]
         each = later.shape[1]
         stream = self._stream.of_runs(np.repeat(run, each))
         drawn = stream.uniform(np.repeat(keys, each), later.reshape(-1))
-        steps = interval_ns(drawn).reshape(later.shape)
+        steps = message_intervals_ns(drawn).reshape(later.shape)
         return np.cumsum(np.concatenate([start_ns[:, np.newaxis], steps], axis=1), axis=1)
 
     def _chunk_starts(self, key: int, run: int, until_ns: int) -> array[int]:
-        """Return the starts of an aircraft's chunks, the last one after an instant."""
+        """Return when an aircraft's message chunks begin, ns, to the first after `until_ns`."""
         keys, runs = np.array([key], dtype=np.uint64), np.array([run])
         starts = self._starts.get((key, run))
         if starts is None:
@@ -106,6 +107,6 @@ class SquitterClocks:
             chunks = int((until_ns - starts[-1]) / (_LONGEST_NS * _CHUNK)) + 1
             count = min(chunks, _MOST_CHUNKS) * _CHUNK
             numbers = (len(starts) - 1) * _CHUNK + np.arange(count + 1)[np.newaxis]
-            later = self._instants(keys, runs, np.array(starts[-1:]), numbers)
+            later = self._sending_instants_ns(keys, runs, np.array(starts[-1:]), numbers)
             starts.extend(later[0, _CHUNK::_CHUNK].tolist())
         return starts

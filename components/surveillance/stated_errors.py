@@ -42,7 +42,7 @@ _LEAST_M2 = 1e-4
 
 
 def lasting_errors(position_errors: str, is_geometric: bool = False) -> dict[str, LastingError]:
-    """Return errors of broadcast values that last; rounding is taken to last too."""
+    """Return, by quantity, ADS-B position errors that stay correlated; empty without errors."""
     if position_errors == "none":
         return {}
     lasts_s = {} if is_geometric else {"elevation": math.inf}  # an aircraft keeps its altimeter
@@ -76,7 +76,7 @@ ERRORS_OF_REPLIES = (
 
 
 def errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[ToldError, ...]:
-    """Return the errors that broadcasts tell of; what is rounded stays in its step as long."""
+    """Return the errors that broadcasts state about themselves, with how long each lasts."""
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
     level = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
@@ -85,12 +85,14 @@ def errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[ToldE
 
 
 def empty_error_columns(count: int) -> dict[str, FloatArray]:
-    """Return the columns `TOLD` of reports without a velocity and without errors."""
+    """Return the `TOLD` columns for `count` reports without velocity and without stated errors: 0
+    for deviations and ages, NaN for others.
+    """
     none, unknown = np.zeros(count), np.full(count, np.nan)
     return {name: none if name.endswith(("deviation", "age_s")) else unknown for name in TOLD}
 
 
-def variances_of_replies(
+def position_variances_of_replies_m2(
     ned_m: FloatArray,
     bearing_rad2: FloatArray,
     place_m2: float,
@@ -98,7 +100,8 @@ def variances_of_replies(
     step_ft: FloatArray,
     mode_s: BoolArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return mean square errors of where replies place aircraft: across, along and vertical, m².
+    """Return the variances (m²) of positions from transponder replies: horizontally across and
+    along the line of sight, and vertical.
 
     Bearing and range are counted from the ownship's own place, which has `place_m2`; the altitude
     is that of no pose.
@@ -111,7 +114,7 @@ def variances_of_replies(
 
 @dataclass(frozen=True)
 class StatedByAircraft:
-    """What the categories of some aircraft, by index, state of what they reported.
+    """Errors and ages that some aircraft state of their reports through quality categories.
 
     `errs` and `rounds` say whether what they send has errors, and is rounded; pressure altitudes
     are off heights by so much beside, unless it is their geometric heights that are taken.
@@ -126,8 +129,8 @@ class StatedByAircraft:
     is_geometric: bool = False
 
     @property
-    def speed_m2_s2(self) -> FloatArray:
-        """Mean square error of each horizontal axis of velocities, (n,)."""
+    def speed_variance_m2_s2(self) -> FloatArray:
+        """Mean square error of the north and of the east velocity, m²/s², (n,)."""
         square = self.equipage.velocity_deviation_m_s[self.craft] ** 2
         speed = np.where(self.errs, square, _LEAST_M2)
         return speed + self._speed_rounding_m2_s2
@@ -150,12 +153,13 @@ class StatedByAircraft:
 
     @property
     def late_s(self) -> FloatArray:
-        """By how long positions are late along the way that a reported velocity goes, (n,)."""
+        """Reported positions' lag along the reported velocity, s, (n,); 0 without velocity."""
         known = ~np.isnan(self.said["reported_north_m_s"])
-        return np.where(known, self.equipage.late_s[self.craft], 0.0)
+        return np.where(known, self.equipage.uncompensated_latency_s[self.craft], 0.0)
 
     def extrapolation_time_s(self, age_s: FloatArray) -> FloatArray:
-        """Return for how long positions are carried on, first by the aircraft that sends them.
+        """Return the total time over which each position is extrapolated: its age, and what the
+        aircraft itself compensates of its latency.
 
         Without a velocity of theirs nobody carries them on, and they are as old as they are.
         """
@@ -164,8 +168,8 @@ class StatedByAircraft:
         latency_s, compensated_s = (one[self.craft] for one in own_s)
         return age_s + np.where(known, compensated_s, latency_s)
 
-    def position_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return mean square errors of positions carried on: of two level axes, and vertical.
+    def position_variances_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return variances (m²) of extrapolated positions: two horizontal axes, then vertical.
 
         What they are late by (`late_s`) is beside these.
         """
@@ -185,7 +189,7 @@ class StatedByAircraft:
         moving = ~np.isnan(self.said["reported_north_m_s"])
         level = (
             level
-            + np.where(moving, self.speed_m2_s2, _UNKNOWN_M_S**2)
+            + np.where(moving, self.speed_variance_m2_s2, _UNKNOWN_M_S**2)
             * self.extrapolation_time_s(age_s) ** 2
         )
         return level, level, high
@@ -193,7 +197,7 @@ class StatedByAircraft:
     def velocities_and_errors(
         self, north_east_down_m_s: FloatArray, velocity_age_s: FloatArray, age_s: FloatArray
     ) -> dict[str, FloatArray]:
-        """Return velocities of some age, and what errs of them and of positions, as `TOLD`."""
+        """Return velocities, and stated velocity and position errors, by column in `TOLD`."""
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
         none = np.zeros(len(age_s))
@@ -207,7 +211,7 @@ class StatedByAircraft:
         velocity = dict(zip(TOLD[:6], (*north_east_down_m_s, *variances), strict=True))
         known = ~np.isnan(north_east_down_m_s[0])
         rounding_m2 = self._height_rounding_m2
-        _, _, high = self.position_m2(none)
+        _, _, high = self.position_variances_m2(none)
         # Without a velocity an aircraft may have gone anywhere at the speed of one.
         carried_m = np.where(known, 0.0, _UNKNOWN_M_S) * carried_s
         white = (_COMPACT_M2 if self.rounds else 0.0) + _LEAST_M2 + carried_m**2
@@ -217,7 +221,7 @@ class StatedByAircraft:
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
             "rounding_deviation": np.sqrt(rounding_m2),
             "climb_deviation": none + math.sqrt(climb),
-            "speed_deviation": np.sqrt(self.speed_m2_s2),
+            "speed_deviation": np.sqrt(self.speed_variance_m2_s2),
             "latency_deviation": self.late_s,
             "age_s": np.where(known, carried_s, 0.0),
             "velocity_age_s": np.where(known, velocity_age_s + latency_s, 0.0),

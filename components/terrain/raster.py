@@ -22,7 +22,7 @@ from components.geometry import RAD_PER_DEG, radii_of_curvature, remainder
 from components.terrain.voids import MOST_VOIDS, fill_voids
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import ScenePath
-from dsa_des.files.input_files import InputFileError, cache_reads, readable_file_status
+from dsa_des.files.input_files import InputFileError, cache_file_reads, readable_file_status
 from dsa_des.text.safe_text import shorten
 
 # Longitudes are met to this share of a step at the raster's edges: a degree is not exact in them.
@@ -33,7 +33,7 @@ MOST_NODES = 100_000_000
 
 
 def refuse_many_nodes(name: str, rows: int, columns: int) -> None:
-    """Raise ValueError if a raster is larger than what is held; before any of it is read."""
+    """Raise ValueError, before it is read, if a raster has more nodes than memory may hold."""
     if rows * columns > MOST_NODES:
         raise ValueError(
             f"{name} spans {rows:,} by {columns:,} nodes: at most {MOST_NODES:,} are held; cut it "
@@ -44,7 +44,7 @@ def refuse_many_nodes(name: str, rows: int, columns: int) -> None:
 
 @dataclass(frozen=True, eq=False)
 class ElevationRaster:
-    """Heights at nodes, between which they are bilinear."""
+    """Terrain heights at the nodes of a regular grid, interpolated bilinearly between them."""
 
     south_deg: float  # Latitude of the first row, longitude of the first column
     west_deg: float
@@ -72,7 +72,7 @@ class ElevationRaster:
         if count := int(np.count_nonzero(holes)):
             row, column = (int(i) for i in np.argwhere(holes)[0])
             raise ValueError(
-                f"{self.name} has {_holes(count)} at latitude "
+                f"{self.name} has {_holes_text(count)} at latitude "
                 f"{self.south_deg + row * self.lat_step_deg:.6g}, longitude "
                 f"{self.west_deg + column * self.lon_step_deg:.6g}: every node must have a height, "
                 f"and up to {MOST_VOIDS:.0%} of a file's nodes are filled from around them; fill "
@@ -81,12 +81,12 @@ class ElevationRaster:
 
     @property
     def north_deg(self) -> float:
-        """Latitude of the last row."""
+        """Latitude of the northernmost row, deg."""
         return self.south_deg + (self.height_m.shape[0] - 1) * self.lat_step_deg
 
     @property
     def east_deg(self) -> float:
-        """Longitude of the last column, from the first one on."""
+        """Longitude of the last column, deg, counted from the first without wrapping at 180."""
         return self.west_deg + (self.height_m.shape[1] - 1) * self.lon_step_deg
 
     @cached_property
@@ -96,7 +96,7 @@ class ElevationRaster:
 
     @cached_property
     def spacing_m(self) -> float:
-        """Shortest way between neighbouring nodes over the ground."""
+        """Smallest horizontal distance between neighbouring nodes, m."""
         lat = np.array([self.south_deg, self.north_deg])
         meridian, prime_vertical = radii_of_curvature(lat)
         along = float(meridian.min()) * self.lat_step_deg * RAD_PER_DEG
@@ -105,12 +105,12 @@ class ElevationRaster:
         return min(along, max(float(across.min()), 0.1 * along))
 
     @cached_property
-    def largest_step_m(self) -> float:
-        """Largest difference in height between neighbouring nodes."""
+    def largest_height_step_m(self) -> float:
+        """Largest height difference between neighbouring nodes, m."""
         steps = (np.abs(np.diff(self.height_m, axis=axis)).max() for axis in (0, 1))
         return float(max(steps))
 
-    def box(self) -> str:
+    def bounds_text(self) -> str:
         """Return the bounds of the raster as text, for messages."""
         return (
             f"latitudes {self.south_deg:.6g} to {self.north_deg:.6g}, longitudes "
@@ -120,17 +120,19 @@ class ElevationRaster:
     def row_and_column(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return positions in rows from the south and columns from the west, with fractions."""
+        """Return positions as fractional rows from the south and columns from the west."""
         v = (lat_deg - self.south_deg) / self.lat_step_deg
         # Whichever turn the longitude is given in; what lies a rounding west of the first column
         # is on it.
         edge = _EDGE * self.lon_step_deg
         return v, (remainder(lon_deg - self.west_deg + edge, 360.0) - edge) / self.lon_step_deg
 
-    def height(
+    def heights_and_coverage(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return the heights of the ground (m) at some positions, and which lie on the raster."""
+        """Return ground heights (m; -inf outside the raster) at positions, and a mask that is True
+        where the position lies on the raster.
+        """
         rows, columns = self.height_m.shape
         v, u = self.row_and_column(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)
@@ -146,7 +148,7 @@ class ElevationRaster:
         return np.where(inside, south * (1.0 - up) + north * up, -np.inf), inside
 
 
-def _holes(count: int) -> str:
+def _holes_text(count: int) -> str:
     if count == 1:
         return "1 hole (a node without a height)"
     return f"{count:,} holes (nodes without a height), the first"
@@ -157,7 +159,7 @@ _FIT = 1e-3
 
 
 def mosaic(rasters: Sequence[ElevationRaster]) -> ElevationRaster:
-    """Return one raster of several with the same steps, whose nodes fall onto each other.
+    """Return one raster that joins several rasters of the same steps whose nodes coincide.
 
     Together they fill a rectangle; where two overlap, the later one counts. ValueError if their
     steps differ, their nodes do not fit, or the rectangle is not filled.
@@ -217,7 +219,7 @@ _PATH: TypeAdapter[Path] = TypeAdapter(ScenePath)
 
 @dataclass(frozen=True)
 class RasterOfFile:
-    """A raster read while the scene was checked; equal where the same file was read once."""
+    """A raster that was read when the scene was checked, with the paths of its files."""
 
     paths: tuple[Path, ...]  # Of one file, or of several that lie side by side
     raster: ElevationRaster
@@ -329,7 +331,7 @@ def _read_geotiff(path: Path, name: str) -> ElevationRaster:
 
 
 #: Runs of a study that name the same file share one raster.
-_read_once = cache_reads(8)(read_raster)
+_read_once = cache_file_reads(8)(read_raster)
 
 
 @lru_cache(maxsize=2)

@@ -36,8 +36,10 @@ _SECOND_ECCENTRICITY_SQUARED = ECCENTRICITY_SQUARED / (1.0 - ECCENTRICITY_SQUARE
 _AXIS_RATIO = float(np.sqrt(1.0 - ECCENTRICITY_SQUARED))
 
 
-def share_of_curvature(refraction: str) -> float:
-    """Return the curvature of a level ray as a share of the Earth's; ValueError if unknown."""
+def ray_curvature_share(refraction: str) -> float:
+    """Return the curvature of a horizontal ray divided by the Earth's, for a refraction model by
+    name; ValueError if unknown.
+    """
     if refraction not in REFRACTIONS:
         raise ValueError(
             f"refraction is {refraction!r}: it must be one of {', '.join(REFRACTIONS)}"
@@ -45,13 +47,16 @@ def share_of_curvature(refraction: str) -> float:
     return _FOUR_THIRDS if refraction == "four_thirds" else 0.0
 
 
-def bent_elevation_rad(elevation_rad: Any, range_m: Any, refraction: str = "four_thirds") -> Any:
-    """Return the elevation (rad, at most pi/2) at which a ray arrives whose chord rises so much.
+def refracted_elevation_rad(
+    elevation_rad: Any, range_m: Any, refraction: str = "four_thirds"
+) -> Any:
+    """Return the apparent elevation (rad, at most pi/2) of a refracted ray whose straight chord has
+    this elevation and length.
 
     The ray is an arc with a quarter of the Earth's curvature, less the steeper it is: it leaves
     its chord by D cos(elevation) / (8 R), 0.022° at 20 km.
     """
-    share = share_of_curvature(refraction)
+    share = ray_curvature_share(refraction)
     bent = elevation_rad + (0.5 * share / MEAN_RADIUS_M) * range_m * np.cos(elevation_rad)
     return np.minimum(bent, 0.5 * np.pi)
 
@@ -62,14 +67,14 @@ def horizon_dip_rad(height_m: Any, refraction: str = "none") -> Any:
     acos(R' / (R' + h)) over a sphere of radius R' = R / (1 - share): 1.01° from 1000 m with
     straight rays, 0.88° with those of the 4/3 Earth; 0 from below the surface.
     """
-    radius = MEAN_RADIUS_M / (1.0 - share_of_curvature(refraction))
+    radius = MEAN_RADIUS_M / (1.0 - ray_curvature_share(refraction))
     above = np.maximum(height_m, 0.0)
     # acos(1 - x) in a form that keeps its digits for small x.
     return 2.0 * np.arcsin(np.sqrt(0.5 * above / (radius + above)))
 
 
-def geodetic_of(x: FloatArray, y: FloatArray, z: FloatArray) -> Vector:
-    """Return latitude (rad), longitude (deg) and height (m) of Earth-centred coordinates.
+def geodetic_lat_rad_lon_deg(x: FloatArray, y: FloatArray, z: FloatArray) -> Vector:
+    """Return latitude (rad), longitude (deg) and height (m) of Earth-centred coordinates (m).
 
     Bowring's formula (Survey Review 23, 1976): heights are good to a micrometre up to 50 km.
     """
@@ -86,8 +91,8 @@ def geodetic_of(x: FloatArray, y: FloatArray, z: FloatArray) -> Vector:
     return np.arctan2(top, side), np.arctan2(y, x) * DEG_PER_RAD, height
 
 
-def earth_centred(lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray) -> Vector:
-    """Return the Earth-centred coordinates (m) of flat arrays of positions."""
+def earth_centred_xyz_m(lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray) -> Vector:
+    """Return Earth-centred x, y, z (m) of flat arrays of latitude, longitude (deg), height (m)."""
     _, _, (ux, uy, uz) = local_axes(lat_deg, lon_deg)
     n = SEMI_MAJOR_AXIS_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * uz * uz)
     level = n + alt_m
@@ -107,10 +112,10 @@ class Rays:
     sag_m: FloatArray  # (n,): how far the ray's middle lies below the mean of its ends' heights
     arch_m: FloatArray  # (n,): how far the air lifts its middle above the chord's
 
-    def points(self, share: FloatArray, rays: Any = slice(None)) -> Vector:
-        """Return latitude (rad), longitude (deg) and height (m) at shares of some rays' lengths."""
+    def points_at_shares(self, share: FloatArray, rays: Any = slice(None)) -> Vector:
+        """Return latitude (rad), longitude (deg), height (m) at fractions of rays' lengths."""
         x, y, z = (a[rays] + share * d[rays] for a, d in zip(self.start, self.step, strict=True))
-        lat, lon, height = geodetic_of(x, y, z)
+        lat, lon, height = geodetic_lat_rad_lon_deg(x, y, z)
         return lat, lon, height + 4.0 * self.arch_m[rays] * share * (1.0 - share)
 
     def lowest_height_m(self) -> FloatArray:
@@ -125,10 +130,10 @@ class Rays:
         share = 0.5 - rise / np.where(sagging, 8.0 * self.sag_m, np.inf)
         share = np.clip(share, 0.0, 1.0)
         ends = np.minimum(self.start_alt_m, self.end_alt_m)
-        return np.where(sagging, np.minimum(self.points(share)[2], ends), ends)
+        return np.where(sagging, np.minimum(self.points_at_shares(share)[2], ends), ends)
 
-    def shares_below(self, height_m: float) -> tuple[FloatArray, FloatArray]:
-        """Return the shares of its length between which each ray may be below a height, (n,).
+    def shares_possibly_below(self, height_m: float) -> tuple[FloatArray, FloatArray]:
+        """Return the length fractions between which rays may lie below a height, (n,) each.
 
         Empty, with the first above the last, where it surely is not. The parabola stands for the
         ray, with a margin of 5 m (and more for rays beyond 300 km).
@@ -151,15 +156,15 @@ class Rays:
 
 def rays_between(own: Vector, other: Vector, refraction: str = "none") -> Rays:
     """Return the rays between positions, each three (n,) arrays: lat (deg), lon (deg), alt (m)."""
-    start = earth_centred(*own)
-    end = earth_centred(*other)
+    start = earth_centred_xyz_m(*own)
+    end = earth_centred_xyz_m(*other)
     step = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
     length = np.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-    middle = geodetic_of(*(a + 0.5 * d for a, d in zip(start, step, strict=True)))[2]
+    middle = geodetic_lat_rad_lon_deg(*(a + 0.5 * d for a, d in zip(start, step, strict=True)))[2]
     rise = other[2] - own[2]
     # The air bends a steep ray less: what counts is how level it runs.
     level = 1.0 - np.square(rise / np.where(length > 0.0, length, 1.0))
-    share = share_of_curvature(refraction)
+    share = ray_curvature_share(refraction)
     arch = share * np.square(length) * np.clip(level, 0.0, 1.0) / (8.0 * MEAN_RADIUS_M)
     sag = 0.5 * (own[2] + other[2]) - middle - arch
     return Rays(start, step, length, own[2], other[2], sag, arch)
@@ -180,7 +185,7 @@ _POINTS_AT_ONCE = 1 << 17
 def is_behind_limb(
     own: Vector, other: Vector, *, surface_m: float = 0.0, refraction: str = "none"
 ) -> BoolArray:
-    """Return which rays dip below a surface of constant ellipsoidal height (m; 0 for the sea).
+    """Return a mask of rays that dip below a surface of constant ellipsoidal height (m; 0: sea).
 
     Both ends are three (n,) arrays: latitude (deg), longitude (deg), altitude (m). One below the
     surface is hidden from everywhere.
@@ -197,7 +202,7 @@ def is_behind_terrain(
     offset_m: float = 0.0,
     refraction: str = "none",
 ) -> BoolArray:
-    """Return which rays run through the ground of a raster.
+    """Return a mask over rays: True where the ray runs through the ground of the raster.
 
     The ray's height over the ellipsoid is compared with the bilinear ground under it at points
     half a node's spacing apart, the ends left out. Beside the raster no ground is known, and
@@ -210,11 +215,11 @@ def is_behind_terrain(
     slope times half their distance, and a ray can sink by its sag. Rays that come so near to the
     ground are looked at again, sixteen times as finely and where they cross rows and columns of
     nodes. In a cell the ground is a parabola along the ray, so that one may be taken for free
-    although ground stands in it up to `miss_bound_m`, 0.0005 · `largest_step_m` where nodes lie
-    close; never for hidden where none does.
+    although ground stands in it up to `max_undetected_ground_m`, 0.0005 · `largest_height_step_m`
+    where nodes lie close; never for hidden where none does.
     """
     rays = rays_between(own, other, refraction)
-    first, last = rays.shares_below(raster.highest_m + offset_m)
+    first, last = rays.shares_possibly_below(raster.highest_m + offset_m)
     hidden = np.zeros(len(first), dtype=bool)
     spacing = 0.5 * raster.spacing_m
     count = np.ceil(rays.length_m * np.maximum(last - first, 0.0) / spacing).astype(np.int64) + 1
@@ -229,15 +234,18 @@ def is_behind_terrain(
     return hidden
 
 
-def miss_bound_m(raster: ElevationRaster) -> float:
-    """Return how high ground may stand in a ray that is taken for free, at most."""
+def max_undetected_ground_m(raster: ElevationRaster) -> float:
+    """Return an upper bound, m, on how far ground may rise above a ray that tests as clear."""
     # Second derivative 2 · twist, twist at most twice the largest step; an eighth of the squared
     # distance of points a thirty-second of a cell apart. The same of the Earth's curvature.
-    return 4.0 / 8.0 / 32.0**2 * raster.largest_step_m + _sag_between_m(raster) / len(_COMB) ** 2
+    return (
+        4.0 / 8.0 / 32.0**2 * raster.largest_height_step_m
+        + _max_ray_sag_m(raster) / len(_COMB) ** 2
+    )
 
 
-def _sag_between_m(raster: ElevationRaster) -> float:
-    """Return how far a ray sinks towards level ground between two points, at most."""
+def _max_ray_sag_m(raster: ElevationRaster) -> float:
+    """Return an upper bound, m, on a ray's sag towards level ground between two samples."""
     return float((0.5 * raster.spacing_m) ** 2 / (8.0 * MEAN_RADIUS_M))
 
 
@@ -256,18 +264,18 @@ def _meets_ground(
     step = np.arange(ends[-1]) - np.repeat(ends - number, number)
     # In the middles of equal pieces: never at an end, which may stand on the ground.
     share = first[ray] + (step + 0.5) / count[ray] * (last[ray] - first[ray])
-    stands = _terrain_above_ray_m(rays, ray, share, raster, offset_m)
+    stands = terrain_height_above_ray_m(rays, ray, share, raster, offset_m)
     met: BoolArray = np.logical_or.reduceat(stands > _GRAZING_M, ends - number)
     # Where it is a near thing, once more with a finer comb around the points that were near.
-    nearest_m = _COARSE * raster.largest_step_m + _sag_between_m(raster)
+    nearest_m = _COARSE * raster.largest_height_step_m + _max_ray_sag_m(raster)
     near = np.flatnonzero((stands > -nearest_m) & ~np.repeat(met, number))
     for start in range(0, len(near), _POINTS_AT_ONCE // len(_COMB)):
         some = near[start : start + _POINTS_AT_ONCE // len(_COMB)]
         piece = (last[ray[some]] - first[ray[some]]) / count[ray[some]]
         finer = share[some, np.newaxis] + piece[:, np.newaxis] * _COMB
-        crossings = _crossings(rays, ray[some], share[some], piece, raster)
+        crossings = _shares_of_grid_crossings(rays, ray[some], share[some], piece, raster)
         finer = np.column_stack([finer, *crossings])
-        again = _terrain_above_ray_m(
+        again = terrain_height_above_ray_m(
             rays, np.repeat(ray[some], finer.shape[1]), finer.ravel(), raster, offset_m
         )
         hit = ray[some[(again.reshape(finer.shape) > _GRAZING_M).any(axis=1)]]
@@ -275,17 +283,19 @@ def _meets_ground(
     return met
 
 
-def _crossings(
+def _shares_of_grid_crossings(
     rays: Rays,
     ray: npt.NDArray[np.int64],
     share: FloatArray,
     piece: FloatArray,
     raster: ElevationRaster,
 ) -> list[FloatArray]:
-    """Return where pieces of rays cross a row and a column of nodes, where the ground has edges."""
+    """Return, as fractions of the ray's length, where pieces of rays cross a row and a column of
+    the raster, at which the ground may have an edge.
+    """
     ends = []
     for side in (-0.5, 0.5):
-        lat_rad, lon_deg, _ = rays.points(share + side * piece, ray)
+        lat_rad, lon_deg, _ = rays.points_at_shares(share + side * piece, ray)
         ends.append(raster.row_and_column(lat_rad * DEG_PER_RAD, lon_deg))
     shares = []
     for a, b in zip(*ends, strict=True):
@@ -296,7 +306,7 @@ def _crossings(
     return shares
 
 
-def _terrain_above_ray_m(
+def terrain_height_above_ray_m(
     rays: Rays,
     ray: npt.NDArray[np.int64],
     share: FloatArray,
@@ -304,6 +314,6 @@ def _terrain_above_ray_m(
     offset_m: float,
 ) -> FloatArray:
     """Return the height of the ground above rays, m, at shares of their lengths."""
-    lat_rad, lon_deg, height = rays.points(share, ray)
-    ground, _ = raster.height(lat_rad * DEG_PER_RAD, lon_deg)
+    lat_rad, lon_deg, height = rays.points_at_shares(share, ray)
+    ground, _ = raster.heights_and_coverage(lat_rad * DEG_PER_RAD, lon_deg)
     return ground + (offset_m - height)

@@ -54,8 +54,8 @@ def reflection_coefficient(grazing_rad: ArrayLike, permittivity: complex, polari
     return unflatten(of.get(polarisation, 0.5 * (horizontal + vertical)), shape)
 
 
-def specular_share(grazing_rad: ArrayLike, roughness_m: float, wavelength_m: float) -> Any:
-    """Return which share of the field a rough surface mirrors, exp(-g² / 2), g = 4 pi s sin ψ / λ.
+def specular_field_factor(grazing_rad: ArrayLike, roughness_m: float, wavelength_m: float) -> Any:
+    """Return exp(-g² / 2), g = 4 pi s sin ψ / λ: roughness's factor on the reflected field.
 
     s is the standard deviation of heights: W. S. Ament, "Toward a theory of reflection by a rough
     surface", Proc. IRE 41, 1953. By Rayleigh's criterion, g = pi / 2, it is 0.29.
@@ -72,7 +72,7 @@ def specular_share(grazing_rad: ArrayLike, roughness_m: float, wavelength_m: flo
         return unflatten(np.exp(-0.5 * g * g), shape)
 
 
-def two_ray_factor(
+def two_ray_power_factor(
     range_m: ArrayLike,
     own_height_m: ArrayLike,
     target_height_m: ArrayLike,
@@ -84,7 +84,7 @@ def two_ray_factor(
     elevation_beamwidth_rad: float | None = None,
     range_resolution_m: float = 0.0,
 ) -> Any:
-    """Return the factor on a target's echo by the ray that flat ground mirrors.
+    """Return the factor on echo power by interference with the ray reflected by flat ground.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def two_ray_factor(
     sine = np.clip((own + target) / mirrored, 0.0, 1.0)
     grazing = np.arcsin(sine)
     field = reflection_coefficient(grazing, permittivity, polarisation)
-    field = field * specular_share(grazing, roughness_m, wavelength_m)
+    field = field * specular_field_factor(grazing, roughness_m, wavelength_m)
     if elevation_beamwidth_rad:
         up = np.arcsin(np.clip((target - own) / distance, -1.0, 1.0))
         field = field * np.exp(-2.0 * _LN_2 * ((up + grazing) / elevation_beamwidth_rad) ** 2)

@@ -14,7 +14,7 @@ from components.optical.signature import detection_range
 from components.optical.silhouette import visible_area
 from components.thesis.drawing import GREY, panels
 from components.thesis.rows import Cells, Made, Row, calibrated, configured, predicted
-from components.thesis.scenes import aircraft, areas, eo_camera, ir_camera
+from components.thesis.scenes import aircraft, eo_camera, ir_camera, silhouette_areas
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, GREEN, ORANGE, SKY
 
@@ -26,10 +26,10 @@ CLIMB_DEG = 1.4
 KING_AIR_M2 = {"Level head-on": 396 * FOOT_M**2, "Level abeam": 273 * FOOT_M**2}
 
 
-def camera_range_km(
+def camera_detection_range_km(
     camera: Camera, area_m2: Any, contrast: float = 1.0, dynamic: float = 0.0
 ) -> Any:
-    """Return the range at which the signature of an area reaches a camera's threshold."""
+    """Return the range (km) where this visible area (m²) just reaches the camera's threshold."""
     range_m = detection_range(
         area_m2,
         pixel_azimuth_rad=camera.pixel_azimuth_rad,
@@ -54,7 +54,7 @@ class EoCase:
 
     @property
     def name(self) -> str:
-        """Name of its cells."""
+        """Key of this case in the table of printed numbers: geometry and aircraft in lower case."""
         geometry = self.geometry.lower().replace("ascending head-on", "ascending")
         return f"{geometry} {self.intruder.lower()}"
 
@@ -68,11 +68,13 @@ CASES = (
 )
 
 
-def range_km(case: EoCase, camera: Camera, model: str, *, dynamic: float = 0.0) -> float:
-    """Return the range at which a case's signature reaches the threshold, km."""
+def eo_detection_range_km(
+    case: EoCase, camera: Camera, model: str, *, dynamic: float = 0.0
+) -> float:
+    """Return the range (km) where a case's aircraft and geometry just reach the threshold."""
     heading, climb = math.radians(case.heading_deg), math.radians(case.climb_deg)
-    area_m2 = visible_area(heading, climb, 0.0, 0.0, **areas(case.file), model=model)
-    return float(camera_range_km(camera, area_m2, aircraft(case.file).contrast, dynamic))
+    area_m2 = visible_area(heading, climb, 0.0, 0.0, **silhouette_areas(case.file), model=model)
+    return float(camera_detection_range_km(camera, area_m2, aircraft(case.file).contrast, dynamic))
 
 
 def eo_ranges(printed: Cells) -> Made:
@@ -83,8 +85,8 @@ def eo_ranges(printed: Cells) -> Made:
         f"a = {p.static_weight:g}, threshold {p.threshold:g}, P = 1, b = {p.dynamic_weight:g}"
     )
     rows = []
-    by_thesis = [range_km(case, camera, "thesis") for case in CASES]
-    exact = [range_km(case, camera, "exact") for case in CASES]
+    by_thesis = [eo_detection_range_km(case, camera, "thesis") for case in CASES]
+    exact = [eo_detection_range_km(case, camera, "exact") for case in CASES]
     # The simulated cell is lost in the first line, and none in the others.
     simulated = [printed.get(case.name) for case in CASES]
     literature = [printed[f"literature {case.name}"] for case in CASES]
@@ -128,10 +130,10 @@ def eo_ranges(printed: Cells) -> Made:
                 (cell.value / ours) ** 2, "",
                 "Range goes with the square root of P: ±10 % in P are ±5 %.")
         )  # fmt: skip
-    rows += _measured_king_air(printed, camera)
+    rows += _measured_king_air_rows(printed, camera)
     abeam = CASES[2]
-    rate = 100.0 / (1000.0 * range_km(abeam, camera, "exact"))
-    moved = range_km(abeam, camera, "exact", dynamic=rate)
+    rate = 100.0 / (1000.0 * eo_detection_range_km(abeam, camera, "exact"))
+    moved = eo_detection_range_km(abeam, camera, "exact", dynamic=rate)
     rows.append(Row("Level abeam, King Air at 100 m/s, with b = 1 s/rad", moved, "km",
                     "How little b matters: the line of sight turns at 0.016 rad/s."))  # fmt: skip
 
@@ -168,12 +170,12 @@ def eo_ranges(printed: Cells) -> Made:
     return Made.with_figure(rows, "table_4_4", caption, draw, data)
 
 
-def _measured_king_air(printed: Cells, camera: Camera) -> list[Row]:
-    """Return the ranges of a King Air of the measured size, with P = 1 and with more contrast."""
+def _measured_king_air_rows(printed: Cells, camera: Camera) -> list[Row]:
+    """Return rows comparing printed King Air ranges with ours, at contrast gains 1 and 1.5."""
     return [
         printed[f"literature {geometry.lower()} king air"].compare(
             f"{geometry}, King Air of the measured size, P = {gain:g}",
-            float(camera_range_km(camera, area_m2, gain)), "km", "",
+            float(camera_detection_range_km(camera, area_m2, gain)), "km", "",
             predicted(f"the measured area, {area_m2:.1f} m², and P = {gain:g}",
                       "cameras:KING_AIR_M2", "sensors/afrl_eo.toml:static_weight"),
             because="P is not printed; of one aircraft it gives both ranges within 1.3 of each "
@@ -187,8 +189,8 @@ def area_error(printed: Cells) -> Made:
     """Eq. 33-34: what an error of 20 % in the visible area does to the detection range."""
     camera = eo_camera()
     pixel = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
-    front = {file: areas(file)["front_m2"] for file in ("king_air", "boeing_787")}
-    near_km, far_km = (float(camera_range_km(camera, area)) for area in front.values())
+    front = {file: silhouette_areas(file)["front_m2"] for file in ("king_air", "boeing_787")}
+    near_km, far_km = (float(camera_detection_range_km(camera, area)) for area in front.values())
     root = "Range goes with the square root of the area."
     ranges = predicted(
         "Table 2.5's pixels and Table 4.4's areas; P of Table 4.4",
@@ -200,7 +202,7 @@ def area_error(printed: Cells) -> Made:
     rows = [
         printed["error_m"].compare(
             f"error in range for +20 % area, {name}",
-            1000.0 * (float(camera_range_km(camera, area * 1.2)) - km), "m",
+            1000.0 * (float(camera_detection_range_km(camera, area * 1.2)) - km), "m",
             f'{root} "Approximately" 600 m, "for all detection ranges": 50 m are allowed for.',
             ranges)
         for name, area, km in (
@@ -265,7 +267,7 @@ _NO_CURVE = (
 def ir_ranges(_: Cells) -> Made:
     """Fig. 4.11: IR detection range over heading with the areas of Table 3.2."""
     ranges = {name: _ir_ranges_km(name) for name in IR_CLASSES}
-    return _ir_made("fig_4_11", "Table 3.2", ranges)
+    return _ir_ranges_result("fig_4_11", "Table 3.2", ranges)
 
 
 def ir_ranges_refined(printed: Cells) -> Made:
@@ -291,23 +293,23 @@ def ir_ranges_refined(printed: Cells) -> Made:
         Row("abeam range, refined over first, small fighter", ratio["small_fighter"], "",
             "Its errors are printed without a sign: no ratio follows from them.")
     )  # fmt: skip
-    made = _ir_made("fig_4_13", "Table 4.6", ranges, before)
+    made = _ir_ranges_result("fig_4_13", "Table 4.6", ranges, before)
     return Made([*made.rows, *rows], made.pictures, made.data, _ABSOLUTE)
 
 
 def _ir_ranges_km(name: str) -> FloatArray:
     """Return the detection range of an aircraft file over relative heading, 0 to 180°, km."""
-    area_m2 = infrared_area(np.radians(HEADING_DEG), 0.0, 0.0, 0.0, **areas(name, "ir"))
-    return np.asarray(camera_range_km(ir_camera(), area_m2, aircraft(name).contrast_ir))
+    area_m2 = infrared_area(np.radians(HEADING_DEG), 0.0, 0.0, 0.0, **silhouette_areas(name, "ir"))
+    return np.asarray(camera_detection_range_km(ir_camera(), area_m2, aircraft(name).contrast_ir))
 
 
-def _ir_made(
+def _ir_ranges_result(
     figure: str,
     table: str,
     ranges: dict[str, FloatArray],
     before: dict[str, FloatArray] | None = None,
 ) -> Made:
-    """Return the ranges from tail, side and nose, and the figure of them all."""
+    """Return rows of IR detection ranges (tail, side, nose) and the figure over heading."""
     rows = [
         Row(f"detection range {aspect}, {label}", float(ranges[name][index]), "km", _NO_CURVE)
         for name, (label, _) in IR_CLASSES.items()

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from components.display.map_view import outline_of
-from components.display.symbols import add_grid, styles_of
-from components.sensor import marks
+from components.display.symbols import add_grid, sensor_marks
+from components.sensor import palette
 from components.thesis.scenes import SceneRun
 from dsa_des.arrays.types import AnyArray, FloatArray
 from dsa_des.record.drawing import draw_to_png
@@ -19,7 +19,9 @@ from dsa_des.record.drawing import draw_to_png
 WIDTH_IN, HEIGHT_IN = 6.6, 3.9
 
 #: By kind, as in every other figure.
-RADAR, EO, IR, FUSION = (mark.colour for mark in (marks.RADAR, marks.EO, marks.IR, marks.FUSION))
+RADAR, EO, IR, FUSION = (
+    mark.colour for mark in (palette.RADAR, palette.EO, palette.IR, palette.FUSION)
+)
 #: For whatever is no kind of sensor, beside those of `dsa_des.record.drawing`.
 GREY = "#777777"
 
@@ -55,7 +57,7 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
     from matplotlib.patches import Polygon
 
     flights = run.flights
-    styles = styles_of(fields_of_view, run.simulation.components)
+    styles = sensor_marks(fields_of_view, run.simulation.components)
     for name in fields_of_view:
         sensor: Any = run.simulation.components[name]
         colour = styles[name].colour
@@ -79,8 +81,10 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
     axes.set_ylabel("north (km)")
 
 
-def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> None:
-    """Mark where targets were when they were detected: the rows of a recorded table."""
+def mark_detected_targets(
+    axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any
+) -> None:
+    """Plot each row's target on a map at its true position and time, for a recorded table."""
     east, north = true_positions(run, rows)
     defaults = {"linestyle": "none", "marker": "o", "markersize": 4.5, "fillstyle": "none",
                 "color": RADAR, "zorder": 2}  # fmt: skip
@@ -88,21 +92,25 @@ def mark(axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any) -> N
 
 
 def true_positions(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
-    """Return east and north in km of each row's target at its time."""
+    """Return the true east and north position in km of each row's target at the row's time."""
     east, north = np.empty(len(rows["time_s"])), np.empty(len(rows["time_s"]))
     for name in np.unique(rows["target"].astype(str)):
         here = np.flatnonzero(rows["target"] == name)
-        east[here], north[here] = run.flights.position_at(str(name), rows["time_s"][here])
+        east[here], north[here] = run.flights.east_north_km(str(name), rows["time_s"][here])
     return east, north
 
 
 def reported_positions(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
-    """Return east and north in km of what a sensor reports, from a level ownship heading north."""
+    """Return the east and north positions in km that measured azimuth, elevation and range give for
+    a level ownship heading north.
+    """
     ground_km = rows["range_m"] / 1000.0 * np.cos(rows["elevation_rad"])
     return ground_km * np.sin(rows["azimuth_rad"]), ground_km * np.cos(rows["azimuth_rad"])
 
 
-def ray(azimuth_deg: float, length_km: float) -> tuple[list[float], list[float]]:
-    """Return the ends of a line from the ownship's position, east and north."""
+def line_from_ownship(azimuth_deg: float, length_km: float) -> tuple[list[float], list[float]]:
+    """Return the east and north coordinates (km) of both ends of a line that starts at the ownship
+    in the direction of an azimuth.
+    """
     angle = math.radians(azimuth_deg)
     return [0.0, length_km * math.sin(angle)], [0.0, length_km * math.cos(angle)]

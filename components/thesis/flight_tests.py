@@ -17,10 +17,10 @@ from components.thesis.rows import Basis, Cells, Made, Row, calibrated, configur
 from components.thesis.scenes import (
     ThesisRecording,
     aircraft,
-    monte_carlo,
+    load_config_scene,
     radar_parameters,
     read_csv,
-    scene,
+    run_replicas_of_scene,
 )
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, ORANGE
@@ -81,10 +81,11 @@ def pd_at_averages(printed: Cells) -> Made:
         quantity = f"Pd of the {name} class at {km:.2f} km"
         rows.append(printed[f"pd_{name}"].compare(
             quantity, ours, "", "The last digits of both ranges and both Pd are allowed for.",
-            _basis(name), tolerance=_rounding_error_of_pd(sensor, dbsm, km)))  # fmt: skip
+            _basis_of_class_pd(name), tolerance=_rounding_error_of_pd(sensor, dbsm,
+            km)))  # fmt: skip
         off.append(printed[f"off_{name}"].compare(
             f"how far Pd of the {name} class is off 0.9 (§5.1.3)", 100.0 * abs(ours - 0.9), "%",
-            "Percentage points, as there.", _basis(name), again=quantity))  # fmt: skip
+            "Percentage points, as there.", _basis_of_class_pd(name), again=quantity))  # fmt: skip
     rows += off
     to_all = calibrated(f"one bandwidth, {fitted_hz:.0f} Hz, fitted to all three values")
     rows += [
@@ -99,7 +100,7 @@ def pd_at_averages(printed: Cells) -> Made:
             "Not printed; from 0.9114 at 6.91 km (errata 6)."),
         Row("bandwidth by least squares over the three classes", fitted_hz, "Hz",
             "For the residuals only."),
-        *_requirements_of_large(printed, sensor.false_alarm_probability, budget),
+        *_rows_of_large_class(printed, sensor.false_alarm_probability, budget),
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
@@ -132,14 +133,14 @@ def pd_at_averages(printed: Cells) -> Made:
 
 
 def _rounding_error_of_pd(sensor: SwerlingParameters, rcs_dbsm: float, range_km: float) -> float:
-    """Return by how much a printed Pd may differ since two ranges and two Pd are rounded."""
+    """Return the tolerance of a printed Pd due to the rounding of printed ranges and Pd."""
     budget = sensor.link_budget()
     near, far = (pd_at(sensor, budget, rcs_dbsm, range_km + step) for step in (-0.005, 0.005))
     return float(abs(near - far) + 1e-4)
 
 
-def _requirements_of_large(printed: Cells, pfa: float, budget: LinkBudget) -> list[Row]:
-    """Return at which range, or with which RCS, the large class would have the printed Pd."""
+def _rows_of_large_class(printed: Cells, pfa: float, budget: LinkBudget) -> list[Row]:
+    """Return two table rows: the range, and the RCS, where the large class has the printed Pd."""
     dbsm, km = CLASSES["large"]
     needed = required_snr(printed["pd_large"].value, false_alarm_probability=pfa)
     range_m = float(budget.range_for_snr(needed, dbsm_to_m2(dbsm)))
@@ -148,15 +149,16 @@ def _requirements_of_large(printed: Cells, pfa: float, budget: LinkBudget) -> li
     said = f"Pd of the large class at {km:.2f} km"
     return [
         printed["range_large"].compare("range at which the large class has Pd 0.8668",
-                                      range_m / 1000.0, "km", why, _basis("large"), again=said),
+                                      range_m / 1000.0, "km", why, _basis_of_class_pd("large"),
+                                      again=said),
         printed["rcs_large"].compare("RCS that has Pd 0.8668 at 9.75 km",
                                     10.0 * math.log10(needed / there), "dBsm", why,
-                                    _basis("large"), again=said),
+                                    _basis_of_class_pd("large"), again=said),
     ]  # fmt: skip
 
 
-def _basis(name: str) -> Basis:
-    """Return where Pd of a class comes from: the bandwidth was set from the small class."""
+def _basis_of_class_pd(name: str) -> Basis:
+    """Return the basis of a class's Pd: calibrated for the small one, else predicted."""
     if name == "small":
         return calibrated("the radar's bandwidth", "sensors/oasys.toml:calibrate.pd")
     return predicted(
@@ -167,10 +169,10 @@ def _basis(name: str) -> Basis:
 
 
 def detection_ranges(printed: Cells) -> Made:
-    """Table 4.2: its averages, and where simulated intruders were first and last doubtful."""
-    flown = measured_ranges()
-    runs = monte_carlo(scene("thesis/table_4_2"), REPLICAS)
-    simulated = simulated_ranges(runs)
+    """Table 4.2: rows of average and simulated ranges, for first and for unbroken detection."""
+    flown = measured_ranges_km_by_class()
+    runs = run_replicas_of_scene(load_config_scene("thesis/table_4_2"), REPLICAS)
+    simulated = first_and_held_ranges_km(runs)
     flights = predicted(
         "the radar calibrated to the small class's Pd and 100 flights at 150 m/s closing",
         "thesis/table_4_2.toml:blocks.radar.calibrate",
@@ -198,7 +200,7 @@ def detection_ranges(printed: Cells) -> Made:
                 because="it is the other extreme: Pd is 0.9 near the printed average, so single "
                 "scans still miss there"),
         ]  # fmt: skip
-    rows += _declared_rows(printed, runs, flown)
+    rows += _declaration_range_rows(printed, runs, flown)
 
     def draw(path: Path) -> None:
         bins = np.arange(0.0, 15.5, 0.5)
@@ -232,12 +234,12 @@ def detection_ranges(printed: Cells) -> Made:
     return Made(rows, made.pictures, {"table_4_2_simulated": data})
 
 
-def _declared_rows(
+def _declaration_range_rows(
     printed: Cells, runs: list[ThesisRecording], flown: Mapping[str, FloatArray]
 ) -> list[Row]:
-    """Return the averages by the rule of declaration that gives the small class's."""
+    """Return rows comparing average declaration ranges of runs and flight tests, by RCS class."""
     least = SCANS_IN_A_ROW
-    averages = {name: float(np.mean(declared_ranges(runs, name, least))) for name in CLASSES}
+    averages = {name: float(np.mean(declaration_ranges_km(runs, name, least))) for name in CLASSES}
     said = f"declared by {least} detections in {least} scans"
     of, radar = "flight_tests:SCANS_IN_A_ROW", "thesis/table_4_2.toml:blocks.radar.calibrate"
     rows = [
@@ -258,19 +260,19 @@ def _declared_rows(
     return rows
 
 
-def declared_ranges(runs: list[ThesisRecording], name: str, least: int) -> FloatArray:
-    """Return where each run has detected a target in so many scans in a row, km."""
+def declaration_ranges_km(runs: list[ThesisRecording], name: str, least: int) -> FloatArray:
+    """Return each run's range (km) when a target is first seen in `least` consecutive scans."""
     result = []
     for replica in runs:
-        seen = replica.rows("detections", block="radar", target=name)
+        seen = replica.matching_rows("detections", block="radar", target=name)
         scans, ranges = seen["scan"], seen["true_range_m"] / 1000.0
         enough = np.flatnonzero(scans[least - 1 :] - scans[: len(scans) - least + 1] < least)
         result.append(ranges[enough[0] + least - 1])
     return np.array(result)
 
 
-def measured_ranges() -> Mapping[str, FloatArray]:
-    """Return the ranges of Table 4.2 in km, by RCS class."""
+def measured_ranges_km_by_class() -> Mapping[str, FloatArray]:
+    """Return the detection ranges of Table 4.2 in km, an array for each RCS class."""
     cells = read_csv("table_4_2.csv")
     return {
         name: np.array([float(cell["range_km"]) for cell in cells if cell["rcs_class"] == name])
@@ -278,13 +280,17 @@ def measured_ranges() -> Mapping[str, FloatArray]:
     }
 
 
-def simulated_ranges(runs: list[ThesisRecording]) -> dict[str, tuple[FloatArray, FloatArray]]:
-    """Return, by class and for each run, the first range detected and that after the last miss."""
+def first_and_held_ranges_km(
+    runs: list[ThesisRecording],
+) -> dict[str, tuple[FloatArray, FloatArray]]:
+    """Return, by RCS class, two arrays over runs (km): the first detected range, and the range from
+    which on no scan missed.
+    """
     result: dict[str, tuple[FloatArray, FloatArray]] = {}
     for name in CLASSES:
         first, held = [], []
         for replica in runs:
-            seen = replica.rows("detections", block="radar", target=name)
+            seen = replica.matching_rows("detections", block="radar", target=name)
             scans, ranges = seen["scan"], seen["true_range_m"] / 1000.0
             approaching = slice(0, int(np.argmin(ranges)) + 1)
             gaps = np.flatnonzero(np.diff(scans[approaching]) > 1)

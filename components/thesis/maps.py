@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.symbols import styles_of
+from components.display.symbols import sensor_marks
 from components.thesis.drawing import (
     EO,
     FUSION,
@@ -15,15 +15,15 @@ from components.thesis.drawing import (
     RADAR,
     draw_map,
     legend_below,
-    mark,
+    line_from_ownship,
+    mark_detected_targets,
     panels,
-    ray,
     reported_positions,
     true_positions,
 )
 from components.thesis.radar import CLASSES, pd_at
 from components.thesis.rows import Cells, Columns, Made, Row, configured, predicted
-from components.thesis.scenes import radar_parameters, run, scene
+from components.thesis.scenes import load_config_scene, radar_parameters, run
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.mark import BLUE, ORANGE
 
@@ -31,7 +31,7 @@ from dsa_des.block.mark import BLUE, ORANGE
 def _concatenate(
     seen: Mapping[Any, Mapping[str, AnyArray]], keys: Iterable[str], name: str = ""
 ) -> dict[str, AnyArray]:
-    """Return columns of several tables end to end, and of which one each row is."""
+    """Return several tables' given columns end to end, with a column `name` of each row's table."""
     labels = {name: np.repeat(list(seen), [len(rows["time_s"]) for rows in seen.values()])}
     joined = {key: np.concatenate([rows[key] for rows in seen.values()]) for key in keys}
     return {**(labels if name else {}), **joined}
@@ -48,8 +48,8 @@ STEP_DEG = 100.0 / 4000.0 * 180.0 / np.pi
 
 def fields_of_view(printed: Cells) -> Made:
     """Fig. 4.17: the azimuths between which each sensor detects a circling intruder."""
-    done = run(scene("thesis/fig_4_17"))
-    seen = {name: done.rows("detections", block=name) for name in EDGES}
+    done = run(load_config_scene("thesis/fig_4_17"))
+    seen = {name: done.matching_rows("detections", block=name) for name in EDGES}
     rows = []
     for name, source in EDGES.items():
         edge = configured(f"the field of view of {name}, {source}",
@@ -70,8 +70,8 @@ def fields_of_view(printed: Cells) -> Made:
         with panels(path, 1, 3, sharey=True, width_in=9.0, height_in=3.6) as axes:
             for one, name in zip(axes, EDGES, strict=True):
                 draw_map(one, done, fields_of_view=(name,))
-                style = styles_of([name], done.simulation.components)[name]
-                mark(one, done, seen[name], markersize=3.5, color=style.colour)
+                style = sensor_marks([name], done.simulation.components)[name]
+                mark_detected_targets(one, done, seen[name], markersize=3.5, color=style.colour)
                 one.set_title(f"{name}: ±{printed[name].text}°", loc="left")
                 one.set(xlim=(-6.4, 6.4), ylim=(-4.4, 6.4))
             grey = {"color": GREY, "linestyle": "none", "fillstyle": "none", "markersize": 3.5}
@@ -94,11 +94,11 @@ EDGES_KM = np.arange(1.0, 16.0)
 
 def detections_over_range(_: Cells) -> Made:
     """Fig. 4.18: the share of scans that detect, by range, beside the radar's Pd."""
-    done = run(scene("thesis/fig_4_18"))
+    done = run(load_config_scene("thesis/fig_4_18"))
     sensor = radar_parameters()
     budget, small_dbsm = sensor.link_budget(), CLASSES["small"][0]
-    seen = done.rows("detections", block="radar")
-    scans_s = done.rows("scans", block="radar")["time_s"]
+    seen = done.matching_rows("detections", block="radar")
+    scans_s = done.matching_rows("scans", block="radar")["time_s"]
     range_km = np.concatenate([
         np.interp(scans_s, track.time_s, track.range_m) / 1000.0 for track in done.flights.targets
     ])  # fmt: skip
@@ -128,7 +128,9 @@ def detections_over_range(_: Cells) -> Made:
         with panels(path, 1, 2, width_in=9.0, height_in=4.0) as (plan, shares):
             draw_map(plan, done, fields_of_view=("radar",))
             few = {name: column[seen["scan"] % 5 == 0] for name, column in seen.items()}
-            mark(plan, done, few, markersize=3.5, label="detected (one scan in five)")
+            mark_detected_targets(
+                plan, done, few, markersize=3.5, label="detected (one scan in five)"
+            )
             plan.set(xlim=(-16, 16), ylim=(-6, 16))
             legend_below(plan)
             curve_km = np.linspace(1.0, 15.0, 141)
@@ -153,10 +155,12 @@ RESOLUTIONS_DEG = (1.0, 2.5)
 def angular_resolution(printed: Cells) -> Made:
     """Fig. 4.19: spacing and errors of the reported azimuths on a fine and on a coarse grid."""
     runs = {
-        step: run(scene("thesis/fig_4_19", f"blocks.radar.azimuth_resolution_deg={step}"))
+        step: run(
+            load_config_scene("thesis/fig_4_19", f"blocks.radar.azimuth_resolution_deg={step}")
+        )
         for step in RESOLUTIONS_DEG
     }
-    seen = {step: one.rows("detections", block="radar") for step, one in runs.items()}
+    seen = {step: one.matching_rows("detections", block="radar") for step, one in runs.items()}
     grid = configured("the azimuth grid of scene fig_4_19", "maps:RESOLUTIONS_DEG")
     rows = []
     for step, cell in zip(RESOLUTIONS_DEG, ("fine_deg", "coarse_deg"), strict=True):
@@ -175,7 +179,9 @@ def angular_resolution(printed: Cells) -> Made:
             for one, step in zip(axes, RESOLUTIONS_DEG, strict=True):
                 draw_map(one, runs[step])
                 for azimuth in np.unique(np.round(np.degrees(seen[step]["azimuth_rad"]), 6)):
-                    one.plot(*ray(azimuth, 6.0), color="#BBBBBB", linewidth=0.5, zorder=0.5)
+                    one.plot(
+                        *line_from_ownship(azimuth, 6.0), color="#BBBBBB", linewidth=0.5, zorder=0.5
+                    )
                 east, north = reported_positions(seen[step])
                 one.plot(east, north, "o", color=RADAR, fillstyle="none", markersize=4.5,
                          label="reported by radar")  # fmt: skip
@@ -197,10 +203,12 @@ COMBINATIONS = {"radar": ("s", RADAR), "radar+eo": ("D", FUSION), "eo": ("o", EO
 
 
 def two_fields_of_view(_: Cells) -> Made:
-    """Fig. 4.20: how many scans of one intruder have which combination of detections."""
-    done = run(scene("thesis/fig_4_20"))
-    fused = {name: done.rows("fused", block="fusion", sensors=name) for name in COMBINATIONS}
-    scans = len(done.rows("scans", block="radar")["time_s"])
+    """Fig. 4.20: rows counting an intruder's scans by radar and EO detection, and the map."""
+    done = run(load_config_scene("thesis/fig_4_20"))
+    fused = {
+        name: done.matching_rows("fused", block="fusion", sensors=name) for name in COMBINATIONS
+    }
+    scans = len(done.matching_rows("scans", block="radar")["time_s"])
     counts = {name: len(rows["time_s"]) for name, rows in fused.items()}
     counts["no detection"] = scans - sum(counts.values())
     both = np.degrees(fused["radar+eo"]["true_azimuth_rad"])
@@ -223,7 +231,9 @@ def two_fields_of_view(_: Cells) -> Made:
             draw_map(axes, done, fields_of_view=("radar", "eo"))
             for name, (marker, colour) in COMBINATIONS.items():
                 label = f"detected by {name.replace('+', ' and ')}"
-                mark(axes, done, fused[name], marker=marker, color=colour, label=label)
+                mark_detected_targets(
+                    axes, done, fused[name], marker=marker, color=colour, label=label
+                )
             axes.set(xlim=(-5.4, 5.4), ylim=(-0.4, 6.2))
             legend_below(axes, 3)
 
@@ -247,13 +257,13 @@ STEPS, INTRUDERS, SENSORS = 1800, 4, 3
 
 def scan_rate(printed: Cells) -> Made:
     """Fig. 4.21: detections at two scan rates, and the time of the whole scene at 10 Hz."""
-    loaded = scene("thesis/fig_4_21")
+    loaded = load_config_scene("thesis/fig_4_21")
     run(loaded)  # the first run also loads what Python has not loaded yet
     timed = min((run(loaded) for _ in range(3)), key=lambda one: one.wall_s)
-    scans = len(timed.rows("scans", block="radar")["time_s"])
-    runs = {rate: run(scene("thesis/fig_4_21", f"blocks.radar.scan_rate_hz={rate}"))
+    scans = len(timed.matching_rows("scans", block="radar")["time_s"])
+    runs = {rate: run(load_config_scene("thesis/fig_4_21", f"blocks.radar.scan_rate_hz={rate}"))
             for rate in RATES_HZ}  # fmt: skip
-    seen = {rate: one.rows("detections", block="radar") for rate, one in runs.items()}
+    seen = {rate: one.matching_rows("detections", block="radar") for rate, one in runs.items()}
     why = "The fastest of three runs in memory, every sensor at every step; read from the clock."
     clock = predicted("a run on this machine", "thesis/fig_4_21.toml:blocks")
     against = "time of the whole simulation, against"
@@ -279,7 +289,9 @@ def scan_rate(printed: Cells) -> Made:
         with panels(path, 1, 2, sharey=True, width_in=9.0, height_in=4.0) as axes:
             for one, rate in zip(axes, RATES_HZ, strict=True):
                 draw_map(one, runs[rate])
-                mark(one, runs[rate], seen[rate], markersize=3.5, label="detected by radar")
+                mark_detected_targets(
+                    one, runs[rate], seen[rate], markersize=3.5, label="detected by radar"
+                )
                 one.set_title(f"Radar detection: scan rate {rate} Hz", loc="left")
             axes[1].set_ylabel("")
             legend_below(axes[0])
@@ -299,11 +311,11 @@ _MARKS = {"radar": ("s", RADAR, 3.0), "ir": ("^", IR, 5.0), "radar+ir": ("D", FU
 
 def unsynchronised(printed: Cells) -> Made:
     """Fig. 4.22: radar at 5 Hz, IR at 2 Hz, and which of their detections are fused."""
-    done = run(scene("thesis/fig_4_22"))
-    fused = {name: done.rows("fused", block="fusion", sensors=name) for name in _MARKS}
+    done = run(load_config_scene("thesis/fig_4_22"))
+    fused = {name: done.matching_rows("fused", block="fusion", sensors=name) for name in _MARKS}
     alone, together = len(fused["ir"]["time_s"]), len(fused["radar+ir"]["time_s"])
-    gated = run(scene("thesis/fig_4_22", "blocks.fusion.coincidence_s=0.1"))
-    with_gate = len(gated.rows("fused", block="fusion", sensors="radar+ir")["time_s"])
+    gated = run(load_config_scene("thesis/fig_4_22", "blocks.fusion.coincidence_s=0.1"))
+    with_gate = len(gated.matching_rows("fused", block="fusion", sensors="radar+ir")["time_s"])
     rows = [
         printed["share"].compare(
             "share of IR detections fused with the radar's", together / (alone + together), "",
@@ -326,7 +338,7 @@ def unsynchronised(printed: Cells) -> Made:
                 style = {"marker": marker, "color": colour, "markersize": size}
                 first = {key: column[fused[name]["time_s"] < 10.0]
                          for key, column in fused[name].items()}  # fmt: skip
-                mark(plan, done, first, **style, label=label)
+                mark_detected_targets(plan, done, first, **style, label=label)
                 times.plot(first["time_s"], np.full(len(first["time_s"]), height), **style,
                            fillstyle="none", linestyle="none")  # fmt: skip
             plan.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))

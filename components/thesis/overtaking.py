@@ -12,7 +12,7 @@ import numpy as np
 
 from components.thesis.drawing import FUSION, GREY, RADAR, legend_below, panels
 from components.thesis.rows import Cells, Made, Picture, Printed, Row, calibrated
-from components.thesis.scenes import areas, run, scene
+from components.thesis.scenes import load_config_scene, run, silhouette_areas
 from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 #: Aircraft of Table 3.1, by file.
@@ -24,18 +24,18 @@ _DURATION_S = 260
 
 
 def fly_overtaking() -> dict[str, Any]:
-    """Run the scene fig_4_14 with every aircraft, to every side and at every height.
+    """Run fig_4_14 for all aircraft, lateral and vertical offsets; return the result columns.
 
     By column: the range within which the EO camera joins, and the flight.
     """
     flights = [(file, left, above) for file, above, left in product(AIRCRAFT, ABOVE_M, LEFT_M)]
     file, left_m, above_m = map(np.array, zip(*flights, strict=True))
-    joins_km = np.array([_joins_km(*flight) for flight in flights])
+    joins_km = np.array([_first_eo_fusion_range_km(*flight) for flight in flights])
     return {"aircraft": file, "left_m": left_m, "above_m": above_m, "joins_km": joins_km}
 
 
 def overtaking_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[Row], Picture]:
-    """Return nearest and farthest range of each aircraft, and the figure."""
+    """Return rows and figure of least and greatest range of the EO camera joining, by aircraft."""
     where = (
         f"Passing {LEFT_M[0]} to {LEFT_M[-1]} m to the left, {ABOVE_M[0]} to {ABOVE_M[-1]} m above."
     )
@@ -72,25 +72,27 @@ def overtaking_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[R
     return rows, Picture("fig_4_14_flights", caption, draw)
 
 
-def _joins_km(file: str, left_m: int, above_m: int) -> float:
+def _first_eo_fusion_range_km(file: str, left_m: int, above_m: int) -> float:
     intruder = "blocks.traffic.intruders.overtaking"
     done = run(
-        scene(
+        load_config_scene(
             "thesis/fig_4_14",
             f"duration_s={_DURATION_S}",
             f"{intruder}.east_m={-left_m}",
             f"{intruder}.up_m={above_m}",
-            *(f"{intruder}.eo.{name}={area}" for name, area in areas(file).items()),
+            *(f"{intruder}.eo.{name}={area}" for name, area in silhouette_areas(file).items()),
         )
     )
-    seen = done.rows("fused", block="fusion")
+    seen = done.matching_rows("fused", block="fusion")
     return float(seen["true_range_m"][seen["angle_source"] == "eo"].max()) / 1000.0
 
 
 def overtaking(printed: Cells) -> Made:
-    """Return the errors of range, azimuth and elevation over time, and the spread of flights."""
-    done = run(scene("thesis/fig_4_14"))
-    seen = done.rows("fused", block="fusion")
+    """Fig. 4.14: rows and figure of fused range, azimuth and elevation errors during an overtaking,
+    and of variants of the flight.
+    """
+    done = run(load_config_scene("thesis/fig_4_14"))
+    seen = done.matching_rows("fused", block="fusion")
     time_s, range_km = seen["time_s"], seen["true_range_m"] / 1000.0
     with_eo = seen["angle_source"] == "eo"
     azimuth = np.degrees(seen["azimuth_rad"] - seen["true_azimuth_rad"])

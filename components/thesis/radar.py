@@ -12,7 +12,7 @@ from components.radar.link_budget import LinkBudget, detection_range
 from components.radar.swerling import SwerlingParameters
 from components.thesis.drawing import GREY, legend_below, panels
 from components.thesis.rows import Cells, Made, Printed, Row, calibrated, predicted
-from components.thesis.scenes import radar_parameters, run, scene
+from components.thesis.scenes import load_config_scene, radar_parameters, run
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
@@ -30,7 +30,7 @@ CLASSES = {
 MODELS = {"Swerling I": "swerling1", "Swerling V": "swerling5"}
 
 
-def _detector(sensor: SwerlingParameters) -> dict[str, Any]:
+def _detector_arguments(sensor: SwerlingParameters) -> dict[str, Any]:
     return {
         "pulses": sensor.pulses,
         "false_alarm_probability": sensor.false_alarm_probability,
@@ -40,17 +40,21 @@ def _detector(sensor: SwerlingParameters) -> dict[str, Any]:
 def pd_at(
     sensor: SwerlingParameters, budget: LinkBudget, rcs_dbsm: float, range_km: float | FloatArray
 ) -> Any:
-    """Return the Swerling I probability of detection of an RCS at ranges."""
+    """Return the Swerling I detection probability of a target of this RCS at given ranges."""
     snr = budget.snr(1000.0 * range_km, dbsm_to_m2(rcs_dbsm))
-    return detection_probability(snr, **_detector(sensor))
+    return detection_probability(snr, **_detector_arguments(sensor))
 
 
 def range_of_pd_km(
     sensor: SwerlingParameters, rcs_dbsm: float, pd: float = 0.9, model: str = "swerling1"
 ) -> float:
-    """Return the range at which an RCS has this probability of detection."""
+    """Return the range (km) at which a target with this RCS is detected with probability `pd`."""
     range_m = detection_range(
-        sensor.link_budget(), dbsm_to_m2(rcs_dbsm), pd=pd, model=model, **_detector(sensor)
+        sensor.link_budget(),
+        dbsm_to_m2(rcs_dbsm),
+        pd=pd,
+        model=model,
+        **_detector_arguments(sensor),
     )
     return float(range_m) / 1000.0
 
@@ -58,7 +62,7 @@ def range_of_pd_km(
 def pd_over_snr(_: Cells) -> Made:
     """Fig. 4.2: exact, by table and by the thesis's series, for OASys's pulses and false alarms."""
     sensor = radar_parameters()
-    detector = _detector(sensor)
+    detector = _detector_arguments(sensor)
     snr_db = np.linspace(-20.0, 30.0, 501)
     snr = 10.0 ** (snr_db / 10.0)
     exact = {name: detection_probability(snr, model=m, **detector) for name, m in MODELS.items()}
@@ -120,8 +124,10 @@ def pd_over_snr(_: Cells) -> Made:
     return Made.with_figure(rows, "fig_4_2", caption, draw, data)
 
 
-def over_range(name: str, figure: str, thesis: Printed, _: Cells) -> Made:
-    """Figs 4.3 to 4.5: SNR and Pd of one class over range; `thesis` is Pd of §4.1.3."""
+def snr_and_pd_over_range(name: str, figure: str, thesis: Printed, _: Cells) -> Made:
+    """Figs 4.3 to 4.5: rows and figure of SNR and Pd of one RCS class over range; `thesis` is the
+    Pd printed in §4.1.3.
+    """
     rcs_dbsm, average_km = CLASSES[name]
     sensor = radar_parameters()
     budget = sensor.link_budget()
@@ -129,7 +135,7 @@ def over_range(name: str, figure: str, thesis: Printed, _: Cells) -> Made:
     snr = np.asarray(budget.snr(1000.0 * range_km, dbsm_to_m2(rcs_dbsm)))
     snr_db = 10.0 * np.log10(snr)
     fluctuating, steady = (
-        np.asarray(detection_probability(snr, model=model, **_detector(sensor)))
+        np.asarray(detection_probability(snr, model=model, **_detector_arguments(sensor)))
         for model in MODELS.values()
     )
     snr_there = float(budget.snr(1000.0 * average_km, dbsm_to_m2(rcs_dbsm)))
@@ -167,7 +173,7 @@ def over_range(name: str, figure: str, thesis: Printed, _: Cells) -> Made:
 
 
 def specified_range(printed: Cells) -> Made:
-    """§4.1.1: the range at which 5 m² are detected, in either of the two miles."""
+    """§4.1.1: rows and figure of the range of detecting 5 m², in statute and nautical miles."""
     flight, specification = radar_parameters(), radar_parameters("oasys_specification")
     nautical = radar_parameters("oasys_specification", calibrate={
         "rcs_dbsm": RCS_DBSM, "range_km": NAUTICAL_KM, "pd": 0.9})  # fmt: skip
@@ -177,7 +183,7 @@ def specified_range(printed: Cells) -> Made:
         "flight test": (flight, GREEN),
     }
     range_, specified, pd = (printed[name] for name in ("range_km", "specified_km", "pd"))
-    seen = run(scene("thesis/sec_4_1_1")).rows("detections", block="radar")
+    seen = run(load_config_scene("thesis/sec_4_1_1")).matching_rows("detections", block="radar")
     first_km = float(seen["true_range_m"][0]) / 1000.0
 
     def pd_of(sensor: SwerlingParameters, range_km: float) -> float:

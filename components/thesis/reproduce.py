@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 from components.thesis.rows import DIFFERS, Columns, Made, Row, tally
-from components.thesis.table import ITEMS, Item, chosen
+from components.thesis.table import ITEMS, Item, select_items
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
-from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_file import check_file_writable, write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.output_names import user_path
 from dsa_des.record.run_folder import write_run_json
@@ -28,17 +28,17 @@ def reproduce_items(
     items: tuple[str, ...], out: str | None, as_json: bool, page: str | None
 ) -> None:
     """Make the items into a folder and print their rows; exit code 1 if one cannot be computed."""
-    wanted = chosen(items)
+    wanted = select_items(items)
     if page is not None and len(wanted) < len(ITEMS):
         raise UsageError("--page shows all items: leave the ITEMs out")
     shown_on = None if page is None else user_path(page, "--page")
     if shown_on is not None:
-        check_file(shown_on, "--page")
+        check_file_writable(shown_on, "--page")
     target = OutputFolder.from_option(out, Path("runs"), "thesis")
     started = time.perf_counter()
-    with target.writing() as folder:
-        results, failures = make(wanted)
-        write(folder, results, failures, time.perf_counter() - started)
+    with target.write_then_rename() as folder:
+        results, failures = make_items(wanted)
+        write_results(folder, results, failures, time.perf_counter() - started)
     if shown_on is not None and not failures:
         try:
             _write_page(shown_on, results, target.path)
@@ -48,15 +48,15 @@ def reproduce_items(
     if as_json:
         say_json(rows)
     else:
-        _show(results, target.path)
+        _print_results(results, target.path)
     for failure in failures:
         say(f"error: {failure}", err=True)
     if failures:
         sys.exit(1)
 
 
-def make(wanted: list[Item]) -> tuple[Results, list[str]]:
-    """Return the result of each item, and the items that could not be computed."""
+def make_items(wanted: list[Item]) -> tuple[Results, list[str]]:
+    """Compute the items; return each with its result, and a sentence for each that failed."""
     results: Results = []
     failures = []
     for item in wanted:
@@ -74,8 +74,8 @@ def make(wanted: list[Item]) -> tuple[Results, list[str]]:
     return results, failures
 
 
-def write(folder: Path, results: Results, failures: list[str], wall_s: float) -> None:
-    """Write figures, data, rows and the page into a folder."""
+def write_results(folder: Path, results: Results, failures: list[str], wall_s: float) -> None:
+    """Write the figures, data files, table of rows, page and run.json of results into a folder."""
     for name in _FOLDERS:
         (folder / name).mkdir()
     for _, made in results:
@@ -85,7 +85,7 @@ def write(folder: Path, results: Results, failures: list[str], wall_s: float) ->
             _write_csv(folder / "data" / f"{name}.csv", columns)
     rows = [row.as_dict(item.name) for item, made in results for row in made.rows]
     _write_rows(folder / "rows.csv", rows)
-    (folder / "thesis.md").write_text(markdown(results, "figures"), encoding="utf-8")
+    (folder / "thesis.md").write_text(markdown_page(results, "figures"), encoding="utf-8")
     content: dict[str, Any] = {
         "title": "The thesis, figure by figure",
         "rows": rows,
@@ -103,10 +103,10 @@ def _write_page(page: Path, results: Results, source: Path) -> None:
         for picture in made.pictures:
             figure = source / "figures" / f"{picture.name}.png"
             write_file(images / figure.name, figure.read_bytes())
-    write_file(page, markdown(results, f"images/{page.stem}").encode())
+    write_file(page, markdown_page(results, f"images/{page.stem}").encode())
 
 
-def _show(results: Results, target: Path) -> None:
+def _print_results(results: Results, target: Path) -> None:
     from rich.table import Table
 
     console = terminal.console(160)
@@ -121,8 +121,8 @@ def _show(results: Results, target: Path) -> None:
                 item.name,
                 row.quantity,
                 row.printed or "",
-                short(row.ours),
-                "" if row.difference is None else short(row.difference, sign=True),
+                four_digit_text(row.ours),
+                "" if row.difference is None else four_digit_text(row.difference, sign=True),
                 row.unit,
                 row.verdict_text,
             )
@@ -135,17 +135,17 @@ def _show(results: Results, target: Path) -> None:
 
 def _write_csv(path: Path, columns: Columns) -> None:
     """Write columns of equal length; numbers with nine significant digits."""
-    lines = [[_text(value) for value in line] for line in zip(*columns.values(), strict=True)]
+    lines = [[_csv_text(value) for value in line] for line in zip(*columns.values(), strict=True)]
     _write_lines(path, [list(columns), *lines])
 
 
 def _write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write compared rows as they are in JSON; what does not exist is an empty field."""
     names = list(rows[0]) if rows else []
-    _write_lines(path, [names, *([_text(row[name]) for name in names] for row in rows)])
+    _write_lines(path, [names, *([_csv_text(row[name]) for name in names] for row in rows)])
 
 
-def _text(value: Any) -> str:
+def _csv_text(value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, str):
@@ -158,7 +158,7 @@ def _write_lines(path: Path, lines: Sequence[Sequence[str]]) -> None:
         csv.writer(file, lineterminator="\n").writerows(lines)
 
 
-def short(value: float, sign: bool = False) -> str:
+def four_digit_text(value: float, sign: bool = False) -> str:
     """Return a number with four significant digits."""
     text = f"{value:+.4g}" if sign else f"{value:.4g}"
     if "e" in text and 1e-4 < abs(value) < 1e9:
@@ -166,21 +166,21 @@ def short(value: float, sign: bool = False) -> str:
     return text
 
 
-def markdown(results: Results, images: str) -> str:
-    """Return the page; `images` is the folder of the figures, as seen from it."""
+def markdown_page(results: Results, images: str) -> str:
+    """Return the Markdown page of all results; `images` is the figures' folder as seen from it."""
     rows = [row for _, made in results for row in made.rows]
     head = _PAGE.read_text(encoding="utf-8").format(tally=tally(rows, "*"))
-    return "\n".join([head, *(_section(item, made, images) for item, made in results)])
+    return "\n".join([head, *(_markdown_section(item, made, images) for item, made in results)])
 
 
-def _section(item: Item, made: Made, images: str) -> str:
-    lines = [f"## {item.title} ({_label(item)})", ""]
+def _markdown_section(item: Item, made: Made, images: str) -> str:
+    lines = [f"## {item.title} ({_item_label(item)})", ""]
     derived = any(row.derived for row in made.rows)
     extra = (" derived |", " ---: |") if derived else ("", "")
     lines += [f"| quantity | printed |{extra[0]} ours | difference | unit | verdict | from |"]
     lines += [f"| --- | ---: |{extra[1]} ---: | ---: | --- | --- | --- |"]
-    said = remarks(made.rows)
-    lines += [line(row, derived, said) for row in made.rows]
+    said = footnotes(made.rows)
+    lines += [markdown_table_row(row, derived, said) for row in made.rows]
     lines.append("")
     if said:
         lines += ["  \n".join(f"{letter} {text}" for text, letter in said.items()), ""]
@@ -191,35 +191,35 @@ def _section(item: Item, made: Made, images: str) -> str:
     return "\n".join(lines)
 
 
-def remarks(rows: Sequence[Row]) -> dict[str, str]:
-    """Return text → letter of what several rows of a table say; it stands once, below the table."""
+def footnotes(rows: Sequence[Row]) -> dict[str, str]:
+    """Return footnotes: each text that several rows would repeat, with its letter in brackets."""
     said: Counter[str] = Counter()
     for row in rows:
-        said.update([*row.sources, *([row.because] if row.verdict == DIFFERS else [])])
+        said.update([*row.source_sentences, *([row.because] if row.verdict == DIFFERS else [])])
     repeated = [text for text, number in said.items() if number > 1 and len(text.split()) > 2]
-    return {text: f"({_letter(number)})" for number, text in enumerate(repeated)}
+    return {text: f"({_footnote_letters(number)})" for number, text in enumerate(repeated)}
 
 
-def _letter(number: int) -> str:
+def _footnote_letters(number: int) -> str:
     before, last = divmod(number, 26)
-    return (_letter(before - 1) if before else "") + chr(ord("a") + last)
+    return (_footnote_letters(before - 1) if before else "") + chr(ord("a") + last)
 
 
-def line(row: Row, derived: bool, said: Mapping[str, str]) -> str:
-    """Return a row as a line of its table, with or without the column of derived numbers.
+def markdown_table_row(row: Row, derived: bool, said: Mapping[str, str]) -> str:
+    """Return a row as a Markdown table line, with or without the column of derived numbers.
 
     What is among `said` is replaced by its letter.
     """
-    difference = "" if row.difference is None else short(row.difference, sign=True)
+    difference = "" if row.difference is None else four_digit_text(row.difference, sign=True)
     verdict = row.verdict
     if verdict == DIFFERS:
         verdict += f" {said.get(row.because, row.because)}"
-    source = " ".join(said.get(part, part) for part in row.sources)
+    source = " ".join(said.get(part, part) for part in row.source_sentences)
     cells = (row.quantity, row.printed or "", *((row.derived,) if derived else ()),
-             short(row.ours), difference, row.unit, verdict, source)  # fmt: skip
+             four_digit_text(row.ours), difference, row.unit, verdict, source)  # fmt: skip
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def _label(item: Item) -> str:
+def _item_label(item: Item) -> str:
     kind, _, number = item.name.partition("-")
     return {"fig": "Fig. ", "table": "Table ", "sec": "§", "eq": "eq. "}[kind] + number

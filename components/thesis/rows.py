@@ -21,7 +21,7 @@ _SENTENCES = {
 
 @dataclass(frozen=True)
 class Basis:
-    """Where a number of ours comes from: predicted, calibrated or configured, and by what."""
+    """Where one of our numbers comes from (predicted, calibrated, configured), with its inputs."""
 
     kind: str
     #: What it was predicted from, which parameter was set from the printed number, or which input
@@ -38,13 +38,13 @@ class Basis:
         return _SENTENCES[self.kind].format(self.words)
 
 
-def _basis(kind: str) -> Callable[..., Basis]:
+def _basis_maker(kind: str) -> Callable[..., Basis]:
     return lambda words, *inputs: Basis(kind, words, inputs)
 
 
 #: The basis of a number to which nothing was fitted, from which a parameter was set, that is an
 #: input of ours: of words and inputs.
-predicted, calibrated, configured = map(_basis, (PREDICTED, CALIBRATED, CONFIGURED))
+predicted, calibrated, configured = map(_basis_maker, (PREDICTED, CALIBRATED, CONFIGURED))
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ class Row:
 
     @property
     def has_value(self) -> bool:
-        """Return whether there is a simulated number."""
+        """Return whether our number is finite."""
         return math.isfinite(self.ours)
 
     @property
@@ -83,7 +83,7 @@ class Row:
 
     @property
     def allowed_difference(self) -> float:
-        """Largest difference that agrees."""
+        """Largest difference that still agrees: the tolerance, or half the last printed digit."""
         if self.tolerance is not None:
             return self.tolerance
         decimals = len((self.printed or "").partition(".")[2])
@@ -117,8 +117,8 @@ class Row:
         return f"{DIFFERS} {self.because}" if self.verdict == DIFFERS else self.verdict
 
     @property
-    def sources(self) -> list[str]:
-        """Return what there is to say of where our number comes from, one thing each."""
+    def source_sentences(self) -> list[str]:
+        """Return sentences on our number's source: basis, reason, and which row it repeats."""
         parts = [self.basis.sentence] if self.basis is not None else []
         if self.why:
             parts.append(self.why)
@@ -127,20 +127,20 @@ class Row:
         return parts
 
     @property
-    def source(self) -> str:
-        """Return in a few words where our number comes from."""
-        return " ".join(self.sources)
+    def source_text(self) -> str:
+        """Return the sentences on where our number comes from as one text."""
+        return " ".join(self.source_sentences)
 
     @property
-    def predicts(self) -> bool:
-        """Return whether this row is the first that predicts its printed number."""
+    def is_first_prediction(self) -> bool:
+        """Return whether our number predicts a printed one that no earlier row compares."""
         predicted = self.basis is not None and self.basis.kind == PREDICTED
         return predicted and self.printed is not None and not self.again
 
     @property
-    def counts(self) -> bool:
-        """Return whether the row is a prediction that agrees, and no other row's."""
-        return self.predicts and self.verdict == PREDICTED
+    def is_agreeing_prediction(self) -> bool:
+        """Return whether the row first predicts its printed number and agrees with it."""
+        return self.is_first_prediction and self.verdict == PREDICTED
 
     def as_dict(self, item: str) -> dict[str, Any]:
         """Return the row for JSON; what does not exist is None."""
@@ -154,7 +154,7 @@ class Row:
             "difference": self.difference,
             "verdict": self.verdict,
             "because": self.because if self.verdict == DIFFERS else None,
-            "from": self.source,
+            "from": self.source_text,
             "inputs": " ".join(self.basis.inputs) if self.basis is not None else "",
         }
 
@@ -171,7 +171,7 @@ class Printed:
 
     @property
     def value(self) -> float:
-        """Return the number."""
+        """Return the printed number as a float."""
         return float(self.text)
 
     def compare(
@@ -186,7 +186,7 @@ class Printed:
         because: str = "",
         again: str = "",
     ) -> Row:
-        """Return ours beside it; what this row allows for, or why it differs, goes before."""
+        """Return a row comparing our number with this; tolerance or reason override its own."""
         return Row(quantity, ours, unit, why, self.text,
                    self.tolerance if tolerance is None else tolerance, because or self.because,
                    basis, again=again)  # fmt: skip
@@ -199,12 +199,12 @@ Columns = Mapping[str, Sequence[Any] | Any]
 
 
 def tally(rows: Sequence[Row], mark: str = "") -> str:
-    """Return one line: how many rows there are by verdict, between marks, and which agree."""
+    """Return a sentence with the rows by verdict, each in marks, and the quantities that agree."""
     verdicts = [row.verdict for row in rows]
     counts = ", ".join(f"{verdicts.count(name)} {mark}{name}{mark}" for name in VERDICTS)
-    agree = [row.quantity for row in rows if row.counts]
+    agree = [row.quantity for row in rows if row.is_agreeing_prediction]
     which = f": {'; '.join(agree)}" if agree else ""
-    tried = sum(row.predicts for row in rows)
+    tried = sum(row.is_first_prediction for row in rows)
     return (
         f"{len(rows)} rows: {counts}. Only a prediction counts as agreement: of {tried} printed "
         f"numbers that are predicted, {len(agree)} agree{which}."
@@ -222,7 +222,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Made:
-    """What became of one item: rows, figures, and columns by the name of their CSV file."""
+    """The result of one item: rows, figures, and data columns by the name of their CSV file."""
 
     rows: list[Row]
     pictures: list[Picture] = field(default_factory=list)
@@ -234,5 +234,5 @@ class Made:
     def with_figure(
         cls, rows: list[Row], name: str, caption: str, draw: Callable[[Path], None], data: Columns
     ) -> "Made":
-        """Return rows with one figure and the data behind it, which have one name."""
+        """Return a result of these rows, one figure and its data file of the same name."""
         return cls(rows, [Picture(name, caption, draw)], {name: data})

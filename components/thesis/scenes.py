@@ -15,7 +15,7 @@ import numpy as np
 
 from components.aircraft.aircraft import Aircraft
 from components.display.flights import Flights
-from components.examples import folder
+from components.examples import configs_folder
 from components.optical.camera import Camera
 from components.optical.sensors import ElectroOptical, Infrared
 from components.radar.swerling import SwerlingParameters
@@ -35,11 +35,11 @@ from dsa_des.time.randomness import Streams
 
 def configs() -> Path:
     """Return the folder ``configs`` of the project: in the package, or beside it in its source."""
-    return folder()
+    return configs_folder()
 
 
-def table(name: str) -> dict[str, Any]:
-    """Return a TOML file of ``configs`` with all it extends, for example ``sensors/oasys``."""
+def read_config(name: str) -> dict[str, Any]:
+    """Return a TOML file of ``configs``, as ``sensors/oasys``, merged with those it extends."""
     return read_scene_file(configs() / f"{name}.toml").data
 
 
@@ -49,22 +49,22 @@ def radar_parameters(name: str = "oasys", **changes: Any) -> SwerlingParameters:
 
 
 def eo_camera(name: str = "afrl_eo") -> Camera:
-    """Return an electro-optical camera of ``configs/sensors``, for its pixels and its weights."""
+    """Return an electro-optical camera built from a file of ``configs/sensors``."""
     return _camera(ElectroOptical, name)
 
 
 def ir_camera(name: str = "midas_ir") -> Camera:
-    """Return an infrared camera of ``configs/sensors``."""
+    """Return an infrared camera built from a file of ``configs/sensors``."""
     return _camera(Infrared, name)
 
 
 def aircraft(name: str) -> Aircraft:
     """Return an aircraft of ``configs/aircraft``."""
-    return Aircraft.model_validate(table(f"aircraft/{name}"))
+    return Aircraft.model_validate(read_config(f"aircraft/{name}"))
 
 
-def areas(name: str, band: str = "eo") -> dict[str, Any]:
-    """Return an aircraft's areas in a band, eo or ir, as silhouettes take them."""
+def silhouette_areas(name: str, band: str = "eo") -> dict[str, Any]:
+    """Return an aircraft's areas (m²) in one band, eo or ir, as silhouette model keywords."""
     result: dict[str, Any] = getattr(aircraft(name), band).model_dump(
         exclude={"silhouette_table", "made_for"}
     )
@@ -83,20 +83,20 @@ def _camera(kind: type[Camera], name: str) -> Camera:
 
 
 def _block_parameters(name: str) -> dict[str, Any]:
-    """Return a block's parameters: without its type, and what it says to the engine of notes."""
+    """Return the parameters in a block's configuration, without type and acknowledged notes."""
     beside = "type", "acknowledged"
-    return {key: value for key, value in table(name).items() if key not in beside}
+    return {key: value for key, value in read_config(name).items() if key not in beside}
 
 
 @dataclass
 class ThesisRecording:
-    """What a run of a scene recorded."""
+    """Recorded tables of one run of a scene."""
 
     #: Table name → column name → values.
     tables: Mapping[str, Columns]
 
-    def rows(self, table: str, **where: str) -> dict[str, AnyArray]:
-        """Return the columns of a recorded table, of those rows whose columns have these texts."""
+    def matching_rows(self, table: str, **where: str) -> dict[str, AnyArray]:
+        """Return a recorded table's columns, for rows whose named columns equal the texts."""
         columns = {name: _values(column) for name, column in self.tables[table].items()}
         keep = np.ones(len(columns["tick"]), dtype=bool)
         for name, text in where.items():
@@ -106,7 +106,7 @@ class ThesisRecording:
 
 @dataclass
 class SceneRun(ThesisRecording):
-    """A run of one scene, with what ran."""
+    """Recorded tables of one run of a scene, together with the simulation that ran."""
 
     simulation: Simulation
     #: Time that building and running took.
@@ -114,7 +114,7 @@ class SceneRun(ThesisRecording):
 
     @cached_property
     def flights(self) -> Flights:
-        """Where all aircraft were."""
+        """True flights of all aircraft of the run."""
         return flights_of(self.simulation)
 
 
@@ -125,15 +125,15 @@ def _values(column: AnyArray | Text) -> AnyArray:
 
 
 def flights_of(simulation: Simulation) -> Flights:
-    """Return where all aircraft are."""
+    """Return the true flights of all aircraft of a simulation; UsageError if it has no traffic."""
     result = Flights.from_simulation(simulation, {})
     if result is None:
         raise UsageError(f"{simulation.scene.path}: has no traffic")
     return result
 
 
-def scene(name: str, *sets: str, swaps: Sequence[str] = ()) -> Scene:
-    """Load a scene of ``configs``, for example ``thesis/fig_4_14``, with values set."""
+def load_config_scene(name: str, *sets: str, swaps: Sequence[str] = ()) -> Scene:
+    """Return a ``configs`` scene, as ``thesis/fig_4_14``, with values set and blocks swapped."""
     return load_scene(configs() / f"{name}.toml", sets=sets, swaps=swaps)
 
 
@@ -147,8 +147,8 @@ def run(loaded: Scene) -> SceneRun:
     return SceneRun(sink.tables(), simulation, wall_s)
 
 
-def monte_carlo(loaded: Scene, replicas: int) -> list[ThesisRecording]:
-    """Run a scene with the seeds 0, 1, ...; the draws of each run are its own."""
+def run_replicas_of_scene(loaded: Scene, replicas: int) -> list[ThesisRecording]:
+    """Run a scene with the seeds 0, 1, ... and return the recording of each run."""
     done = []
     for outcome in run_replicas(loaded, [Replica(seed) for seed in range(replicas)]):
         if isinstance(outcome, Failed):

@@ -29,7 +29,7 @@ from dsa_des.files.output_names import user_path
 from dsa_des.record.drawing import draw_to_png, figure_text
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say, say_lines
 
 # Called with relative heading, pitch, roll and elevation in radians (flat arrays), gives m²:
@@ -83,10 +83,11 @@ class RotationComparison:
         return float(np.abs(self.error).max())
 
 
-def camera_rotation(
+def camera_angles_over_half_turn(
     axis: str, step_deg: float = 10.0
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
-    """Move the camera half a turn about one of the target's body axes.
+    """Return angles from 0 to 180° and, for each, the target's relative heading, pitch, roll and
+    the camera's elevation (rad) about one body axis.
 
     x: from the right wing over the top to the left wing. y: from the nose over the top to the
     tail. z: from the nose past the right wing to the tail. The target stays level; only the line
@@ -115,10 +116,10 @@ def compare_silhouettes(
     step_deg: float = 10.0,
     scale: str = "own_maximum",
 ) -> list[RotationComparison]:
-    """Compare every model with every reference over half turns about the three body axes."""
+    """Return a comparison per model, reference and body axis, over half turns of the camera."""
     if scale not in SCALES:
         raise ValueError(f"scale is {scale!r}: it must be one of {', '.join(SCALES)}")
-    cameras = {axis: camera_rotation(axis, step_deg) for axis in AXES}
+    cameras = {axis: camera_angles_over_half_turn(axis, step_deg) for axis in AXES}
 
     def signatures(name: str, silhouette: Silhouette) -> tuple[dict[str, FloatArray], float]:
         areas = {axis: np.asarray(silhouette(*view)) for axis, (_, view) in cameras.items()}
@@ -144,7 +145,7 @@ def compare_silhouettes(
 
 
 def comparison_table(comparisons: Sequence[RotationComparison]) -> str:
-    """Lay the mean and maximum errors out as a text table like Table 4.3."""
+    """Return the mean and maximum errors as a text table like Table 4.3."""
     names = [("model", "reference"), *((one.model, one.reference) for one in comparisons)]
     first, second = (max(len(pair[column]) for pair in names) for column in (0, 1))
     lines = [f"{'model':<{first}}  {'reference':<{second}}  axis  mean error  max error"]
@@ -188,7 +189,7 @@ _CLEARLY = 1.25
 
 
 def turned_table_warning(areas: Mapping[str, float], table: SilhouetteTable) -> str | None:
-    """Return a warning if a table looks turned by 90°, or None.
+    """Return a warning if a table seems turned 90° in azimuth to the model's areas, or None.
 
     A fuselage shows more abeam than from the nose. Where the three bodies say so by more than a
     quarter and the table says the opposite by as much, its azimuths most likely count from a wing.
@@ -215,7 +216,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = _parser().parse_args(arguments)
     try:
         out = OutputFolder(user_path(options.out))
-        with out.writing() as folder:
+        with out.write_then_rename() as folder:
             try:
                 comparisons = _compare(options)
             except OSError as error:  # of what is read, not of what is written
@@ -344,5 +345,5 @@ def _write_tables(comparisons: Sequence[RotationComparison], folder: Path) -> No
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

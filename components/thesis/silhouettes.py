@@ -9,7 +9,7 @@ import numpy as np
 from components.optical.silhouette import front_and_back_area, visible_area
 from components.thesis.drawing import panels
 from components.thesis.rows import Cells, Made, Row, configured, predicted
-from components.thesis.scenes import areas
+from components.thesis.scenes import silhouette_areas
 from components.thesis.silhouette_comparison import (
     AXES,
     RotationComparison,
@@ -190,7 +190,7 @@ def _comparisons(file: str) -> list[RotationComparison]:
 
 
 def _silhouette(file: str, model: str) -> Silhouette:
-    known = areas(file)
+    known = silhouette_areas(file)
     return lambda *view: visible_area(*view, **known, model=model)
 
 

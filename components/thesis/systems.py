@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from components.display.flights import Flights
-from components.estimation.measurement import range_share
+from components.estimation.measurement import relative_range_deviation
 from components.geometry import line_of_sight_ned, wrap_by_sines
-from components.messages.state_tracks import full_covariance
+from components.messages.state_tracks import covariance_matrices
 from components.optical.detection import detection_probability
 from components.thesis.cameras import KING_AIR_M2
 from components.thesis.drawing import EO, GREY, RADAR, legend_below, panels
@@ -19,11 +19,11 @@ from components.thesis.scenes import (
     SceneRun,
     ThesisRecording,
     flights_of,
-    monte_carlo,
+    load_config_scene,
     radar_parameters,
+    read_config,
     run,
-    scene,
-    table,
+    run_replicas_of_scene,
 )
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, GREEN, ORANGE, PINK, SKY
@@ -37,7 +37,7 @@ _EDGES_KM = np.arange(0.0, 10.5, 1.0)
 
 @dataclass
 class Errors:
-    """Errors of every detection of one sensor over all runs, believed minus true."""
+    """Errors (measured minus true) of all detections of one sensor over all runs."""
 
     range_km: FloatArray
     azimuth_deg: FloatArray
@@ -45,7 +45,9 @@ class Errors:
     east_m: FloatArray
 
     def statistics_by_range(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return middle of each bin of 1 km, mean and standard deviation there."""
+        """Return the centre (km) of each 1 km range bin with at least two values, and mean and
+        standard deviation of the values there.
+        """
         index = np.digitize(self.range_km, _EDGES_KM) - 1
         bins = [number for number in range(len(_EDGES_KM) - 1) if np.sum(index == number) > 1]
         mean = np.array([values[index == number].mean() for number in bins])
@@ -55,9 +57,9 @@ class Errors:
 
 def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
     """Return TECVOL's errors of sensors and navigation: rows, the figure and its data."""
-    loaded = scene("systems/tecvol")
-    runs, flights = monte_carlo(loaded, REPLICAS), flights_of(Simulation(loaded))
-    errors = {name: _errors(runs, flights, name) for name in ("radar", "eo")}
+    loaded = load_config_scene("systems/tecvol")
+    runs, flights = run_replicas_of_scene(loaded, REPLICAS), flights_of(Simulation(loaded))
+    errors = {name: _errors_of_sensor(runs, flights, name) for name in ("radar", "eo")}
     eo, radar = errors["eo"], errors["radar"]
     rows = [
         printed["runs"].compare(
@@ -125,8 +127,8 @@ def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
     return rows, Picture("table_2_4_tecvol", caption, draw), data
 
 
-def _errors(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
-    """Return the errors of what a sensor reports, the ownship flying level to the north."""
+def _errors_of_sensor(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
+    """Return azimuth, elevation and east errors in all runs; the ownship flies level north."""
     parts = [_join_own_position(run, name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
             for key in ("time_s", "ned_azimuth_rad", "ned_elevation_rad", "true_azimuth_rad",
@@ -141,14 +143,17 @@ def _errors(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
 
 
 def _join_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
-    """Return a sensor's detections with the believed own position of each."""
-    result, scans = run.rows("detections", block=name), run.rows("scans", block=name)
+    """Return a sensor's detections (columns) with the ownship's believed position at each."""
+    result, scans = (
+        run.matching_rows("detections", block=name),
+        run.matching_rows("scans", block=name),
+    )
     row = np.searchsorted(scans["tick"], result["tick"])
     return {**result, **{key: scans[key][row] for key in _PLACE}}
 
 
 def _east_error_m(flights: Flights, seen: dict[str, FloatArray]) -> FloatArray:
-    """Return how far east of its place the ownship believes its intruder; NaN without a range."""
+    """Return how far east of the truth, m, detections place the intruder; NaN without range."""
     target = flights.targets[0]
     start = flights.origin
     _, own_east, _ = line_of_sight_ned(
@@ -156,7 +161,7 @@ def _east_error_m(flights: Flights, seen: dict[str, FloatArray]) -> FloatArray:
     )
     ground = seen["range_m"] * np.cos(seen["ned_elevation_rad"])
     believed = own_east + ground * np.sin(seen["ned_azimuth_rad"])
-    east_km, _ = flights.position_at(target.name, seen["time_s"])
+    east_km, _ = flights.east_north_km(target.name, seen["time_s"])
     return np.asarray(believed - 1000.0 * east_km)
 
 
@@ -183,7 +188,7 @@ TABLE_2_3 = (
 )
 
 
-def _show_target(target: str) -> str:
+def _target_label(target: str) -> str:
     """Return ``King Air`` for ``king_air``, ``large aircraft`` for ``large_aircraft``."""
     made_by_name = {"king_air": "King Air", "convair": "Convair", "1 m2": "1 m²"}
     return made_by_name.get(target, target.replace("_", " "))
@@ -199,10 +204,13 @@ _COLOURS = (BLUE, ORANGE, GREEN, SKY, GREY, PINK)
 
 
 def systems(printed: Cells) -> Made:
-    """Return what each system detects first, TECVOL's errors and the RCS of Table 2.3."""
+    """Return rows and figures of first detection ranges, TECVOL's errors and Table 2.3's RCS."""
     # A filter takes seconds of each run and changes no detection, of which these rows are.
     swaps = {"afrl_tracked": ["tracker=tracking.hold_last"]}
-    runs = {name: run(scene(f"systems/{name}", swaps=swaps.get(name, ()))) for name in SYSTEMS}
+    runs = {
+        name: run(load_config_scene(f"systems/{name}", swaps=swaps.get(name, ())))
+        for name in SYSTEMS
+    }
     first = {name: first_ranges_km(done) for name, done in runs.items()}
     statistics, errors, errors_data = _tecvol_errors(printed)
     rows = [
@@ -215,7 +223,7 @@ def systems(printed: Cells) -> Made:
     rows += [
         *_afrl_rows(printed, runs, first["afrl"]),
         *statistics,
-        *_smart_uav(printed),
+        *_smart_uav_rows(printed),
         *_parca_rows(printed),
     ]
     by_laser = first_ranges_km(runs["smart_uav"], "laser")
@@ -233,7 +241,7 @@ def systems(printed: Cells) -> Made:
                 for (target, km), colour in zip(result.items(), _COLOURS, strict=False):
                     axes.barh(height, km, 0.8, color=colour)
                     axes.annotate(
-                        f" {_show_target(target)}, {km:.2f} km",
+                        f" {_target_label(target)}, {km:.2f} km",
                         (km, height),
                         va="center",
                         fontsize=7,
@@ -264,11 +272,11 @@ def systems(printed: Cells) -> Made:
 
 
 def first_ranges_km(done: SceneRun, block: str = "") -> dict[str, float]:
-    """Return at which range each target was first detected, in order of the scene.
+    """Return, by target in the scene's order, the range (km) at which it was first detected.
 
     By any sensor, or by one.
     """
-    seen = done.rows("detections", **({"block": block} if block else {}))
+    seen = done.matching_rows("detections", **({"block": block} if block else {}))
     result: dict[str, float] = {}
     for track in done.flights.targets:
         here = np.flatnonzero(seen["target"] == track.name)
@@ -279,7 +287,7 @@ def first_ranges_km(done: SceneRun, block: str = "") -> dict[str, float]:
 
 
 def _afrl_rows(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float]) -> list[Row]:
-    """Return what section 2.4.1 says of the cameras and of the flight tests."""
+    """Return table rows comparing section 2.4.1's AFRL cameras and flight tests with ours."""
     blocks = runs["afrl"].simulation.scene.blocks
     cameras = [blocks[name].parameters.model_dump() for name in ("left", "centre", "right")]
     low = runs["afrl_low_threshold"].simulation.scene.blocks["centre"].parameters.model_dump()
@@ -310,7 +318,7 @@ def _afrl_rows(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float
             f"AFRL, first detection of the {size} aircraft", first[name] / NAUTICAL_MILE_KM, "NM",
             f"Printed of the flight tests. {why}", seen)
           for size, name in (("small", "king_air"), ("large", "convair"))),
-        *_declarations(printed, runs["afrl"]),
+        *_declaration_rows(printed, runs["afrl"]),
     ]  # fmt: skip
 
 
@@ -318,13 +326,13 @@ def _afrl_rows(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float
 BONANZA_M2 = 10.0
 
 
-def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
-    """Return where the cameras' Pd is 0.9, and that of the earlier study's Bonanza at 3 NM."""
+def _declaration_rows(printed: Cells, done: SceneRun) -> list[Row]:
+    """Return rows on the cameras' range of Pd 0.9, and the Pd of a Bonanza at 2 and 3.5 NM."""
     camera: Any = done.simulation.components["centre"]
     result = camera.detector
     pixel_sr = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
     nine_of_ten = result.threshold + 1.2815515655446004 * result.noise
-    needed = float(camera.signal_of(nine_of_ten, 1.0)["pixels"])
+    needed = float(camera.signal_from_signature(nine_of_ten, 1.0)["pixels"])
     rows = []
     for size, area_m2 in (("small", KING_AIR_M2["Level head-on"]), ("large", 90.0)):
         reached_km = (area_m2 / (pixel_sr * needed)) ** 0.5 / 1000.0
@@ -337,7 +345,7 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
                       "systems/afrl.toml:blocks.centre.false_alarms_per_frame")))  # fmt: skip
     for cell, distance_nm in (("pd_near", 2.0), ("pd_far", 3.5)):
         pixels = BONANZA_M2 / (pixel_sr * (1000.0 * distance_nm * NAUTICAL_MILE_KM) ** 2)
-        signature = camera.p.static_weight * pixels * camera.share(pixels)
+        signature = camera.p.static_weight * pixels * camera.counted_signature_share(pixels)
         pd = detection_probability(signature, result.threshold, result.noise)
         rows.append(printed[cell].compare(
             f"AFRL, Pd of a Bonanza at {distance_nm:g} NM, high threshold", 100.0 * float(pd), "%",
@@ -348,12 +356,12 @@ def _declarations(printed: Cells, done: SceneRun) -> list[Row]:
 
 
 def _parca_rows(printed: Cells) -> list[Row]:
-    """Return how well a camera's track knows the range before and after a weaving flight."""
-    tracks = run(scene("tracking/passive_ranging", "blocks.tracker.passive_range_share=10")).rows(
-        "state_tracks", track_status="confirmed"
-    )
+    """Return rows on a camera track's stated relative range error before and after S-turns."""
+    tracks = run(
+        load_config_scene("tracking/passive_ranging", "blocks.tracker.passive_range_share=10")
+    ).matching_rows("state_tracks", track_status="confirmed")
     away = np.stack([tracks[f"{a}_m"] - tracks[f"own_{a}_m"] for a in ("north", "east", "down")])
-    share = range_share(away, full_covariance(tracks, slice(None), 3))
+    share = relative_range_deviation(away, covariance_matrices(tracks, slice(None), 3))
     rows = []
     for cell, when, time_s in (("parca_before", "before", 10.0), ("parca_after", "after", 46.0)):
         at = int(np.searchsorted(tracks["time_s"], time_s))
@@ -366,12 +374,12 @@ def _parca_rows(printed: Cells) -> list[Row]:
     return rows
 
 
-def _smart_uav(printed: Cells) -> list[Row]:
-    """Return the RCS of Table 2.3 as configured, and how far each is seen."""
+def _smart_uav_rows(printed: Cells) -> list[Row]:
+    """Return table rows with the RCS of each target of Table 2.3 and its range of Pd 0.9."""
     sensor = radar_parameters()
     rows = []
     for file in TABLE_2_3:
-        target = table(file)
+        target = read_config(file)
         name = file.partition("/")[2]
         label, rcs_dbsm = name.replace("_", " "), target["rcs_dbsm"]
         rows += [

@@ -32,14 +32,14 @@ class Item:
     printed: dict[str, Printed] = field(default_factory=dict)
 
     def make(self) -> Made:
-        """Compute it."""
+        """Compute the item and return its rows, figures and data."""
         return self.function(self.printed)
 
 
-def _texts(
+def _printed_numbers(
     numbers: dict[str, str], tolerance: float | None = None, because: str = ""
 ) -> dict[str, Printed]:
-    """Return printed numbers that share one remark."""
+    """Return printed numbers by name that share one tolerance and one reason."""
     return {name: Printed(text, tolerance, because) for name, text in numbers.items()}
 
 
@@ -94,19 +94,20 @@ ITEMS = (
           "specified_km": Printed("5.6", because=_CONTRADICT),
           "pd": Printed("0.9", 0.005, _CONTRADICT)}),
     Item("fig-4.3", "SNR and Pd over range, small target (1.76 dBsm)",
-         partial(radar.over_range, "small", "fig_4_3", _FLIGHTS["pd_small"])),
+         partial(radar.snr_and_pd_over_range, "small", "fig_4_3", _FLIGHTS["pd_small"])),
     Item("fig-4.4", "SNR and Pd over range, medium target (3.01 dBsm)",
-         partial(radar.over_range, "medium", "fig_4_4", _FLIGHTS["pd_medium"])),
+         partial(radar.snr_and_pd_over_range, "medium", "fig_4_4", _FLIGHTS["pd_medium"])),
     Item("fig-4.5", "SNR and Pd over range, large target (6.99 dBsm)",
-         partial(radar.over_range, "large", "fig_4_5", _FLIGHTS["pd_large"])),
+         partial(radar.snr_and_pd_over_range, "large", "fig_4_5", _FLIGHTS["pd_large"])),
     Item("sec-4.1.3", "Pd at the average detection ranges of the flight tests",
          flight_tests.pd_at_averages, _FLIGHTS),
     Item("table-4.1", "RCS classes of the flight tests' aircraft", flight_tests.rcs_classes,
-         _texts({"glider": "1.76", "stinson": "1.76", "long_ez": "1.76", "extra_300": "3.01",
+         _printed_numbers({"glider": "1.76", "stinson": "1.76", "long_ez": "1.76",
+         "extra_300": "3.01",
                     "beech_duchess": "3.01", "king_air": "6.99", "fa_18": "6.99"})),
     # Averages, §4.1.3.
     Item("table-4.2", "Detection ranges of the flight tests", flight_tests.detection_ranges,
-         _texts({"small": "6.91", "medium": "7.31", "large": "9.75"})),
+         _printed_numbers({"small": "6.91", "medium": "7.31", "large": "9.75"})),
     Item("fig-4.8", "Signature of the Beech 99 over rotation",
          partial(silhouettes.rotations, "beech_99", "fig_4_8")),
     Item("fig-4.9", "Signature of the F-16 over rotation",
@@ -115,7 +116,7 @@ ITEMS = (
          partial(silhouettes.rotations, "boeing_787", "fig_4_10")),
     # Mean and maximum errors over half turns, per cent.
     Item("table-4.3", "Mean and maximum errors of the aircraft models", silhouettes.errors,
-         {**_texts({
+         {**_printed_numbers({
              "beech_99 x mean": "3.5", "beech_99 x maximum": "10",
              "beech_99 y mean": "11.5", "beech_99 y maximum": "18.8",
              "beech_99 z mean": "6.2", "beech_99 z maximum": "12",
@@ -132,13 +133,14 @@ ITEMS = (
     Item("eq-34", "From an error in area to one in detection range", cameras.area_error,
          {"error_m": Printed("600", 50.0,
                              "it is 600 m at a detection range of 6.29 km only (errata 26)"),
-          **_texts({"low_share": "6", "high_share": "20"}, because=_SHARE),
-          **_texts({"low": "1", "high": "3"}, because=_NEARER)}),
+          **_printed_numbers({"low_share": "6", "high_share": "20"}, because=_SHARE),
+          **_printed_numbers({"low": "1", "high": "3"}, because=_NEARER)}),
     # Simulation and literature; the first simulated cell is lost.
     Item("table-4.4", "Detection ranges of the EO system", cameras.eo_ranges,
-         {**_texts({"ascending convair": "9.5", "level abeam king air": "6.2",
+         {**_printed_numbers({"ascending convair": "9.5", "level abeam king air": "6.2",
                     "level head-on king air": "3.3", "level head-on convair": "9.1"}),
-          **_texts({"literature ascending king air": "4.8", "literature ascending convair": "5.4",
+          **_printed_numbers({"literature ascending king air": "4.8",
+          "literature ascending convair": "5.4",
                     "literature level abeam king air": "6.7",
                     "literature level head-on king air": "6.7",
                     "literature level head-on convair": "7.7"}, because=_LITERATURE)}),
@@ -146,7 +148,7 @@ ITEMS = (
     # Table 4.6, square metres; the fighter's front and side are lost.
     Item("fig-4.13", "IR detection range over heading, refined parameters",
          cameras.ir_ranges_refined,
-         _texts({
+         _printed_numbers({
              "general_aviation front": "4.6", "general_aviation back": "4.6",
              "general_aviation side": "6", "general_aviation horizontal": "35.52",
              "small_fighter back": "14", "small_fighter horizontal": "37.16",
@@ -158,29 +160,31 @@ ITEMS = (
          {"joins_km": Printed("5.1", 0.15)}),
     # Half widths, Tables 2.2, 2.5 and 2.6.
     Item("fig-4.17", "Fields of view of the three sensors", maps.fields_of_view,
-         _texts({"radar": "110", "eo": "110", "ir": "50"}, maps.STEP_DEG)),
+         _printed_numbers({"radar": "110", "eo": "110", "ir": "50"}, maps.STEP_DEG)),
     Item("fig-4.18", "Radar Pd decreasing with range", maps.detections_over_range),
     # Table 2.2, and the title of the figure.
     Item("fig-4.19", "Angular resolution of the radar", maps.angular_resolution,
-         _texts({"fine_deg": "1", "coarse_deg": "2.5"}, 1e-6)),
+         _printed_numbers({"fine_deg": "1", "coarse_deg": "2.5"}, 1e-6)),
     Item("fig-4.20", "One intruder through two fields of view", maps.two_fields_of_view),
     # §4.5 and §5.1.3.
     Item("fig-4.21", "Influence of the scan rate, and the timed scene", maps.scan_rate,
-         {**_texts({"steps": "1800", "intruders": "4"}, 0.0),
-          **_texts({"wall_s": "3", "wall_later_s": "3.5"}, because=_QUICK)}),
+         {**_printed_numbers({"steps": "1800", "intruders": "4"}, 0.0),
+          **_printed_numbers({"wall_s": "3", "wall_later_s": "3.5"}, because=_QUICK)}),
     # "only half of the IR detections are fused".
     Item("fig-4.22", "Unsynchronised scans of radar and IR", maps.unsynchronised,
          {"share": Printed("0.5", 0.0)}),
     # Tables 2.3 and 2.4, §2.3 and §2.4.1.
     Item("table-2.4", "The systems of the literature", systems.systems,
-         {**_texts({"pixels": "6144", "field_deg": "220", "alarms_low": "0.045",
+         {**_printed_numbers({"pixels": "6144", "field_deg": "220", "alarms_low": "0.045",
                     "alarms_high": "0.01"}),
-          **_texts({"first_small_nm": "5.5", "first_large_nm": "7.4"}, because=_THRESHOLD),
-          **_texts({"declared_small_nm": "3.9", "declared_large_nm": "4.9"}, because=_DECLARES),
-          **_texts({"pd_near": "100", "pd_far": "90"}, because=_OTHER_CAMERA),
-          **_texts({"parca_before": "40", "parca_after": "10"}, because=_MANOEUVRE),
+          **_printed_numbers({"first_small_nm": "5.5", "first_large_nm": "7.4"},
+          because=_THRESHOLD),
+          **_printed_numbers({"declared_small_nm": "3.9", "declared_large_nm": "4.9"},
+          because=_DECLARES),
+          **_printed_numbers({"pd_near": "100", "pd_far": "90"}, because=_OTHER_CAMERA),
+          **_printed_numbers({"parca_before": "40", "parca_after": "10"}, because=_MANOEUVRE),
           "runs": Printed("100", 0.0), "eo_km": Printed("3", 0.075),
-          **_texts({"power_line": "-20", "building": "15", "wooden_hill": "20",
+          **_printed_numbers({"power_line": "-20", "building": "15", "wooden_hill": "20",
                     "small_aircraft": "1.76", "medium_aircraft": "3.01",
                     "large_aircraft": "6.99"})}),
 )  # fmt: skip
@@ -190,7 +194,7 @@ _ALSO = {("eq", "33"): "eq-34", ("eq", "33.34"): "eq-34"}
 _KINDS = {"figure": "fig", "tab": "table", "section": "sec", "§": "sec", "equation": "eq"}
 
 
-def chosen(names: Iterable[str]) -> list[Item]:
+def select_items(names: Iterable[str]) -> list[Item]:
     """Return the items of these names, in the thesis's order; all of them if none is named.
 
     ``fig-4.14``, ``Fig. 4.14``, ``figure_4_14`` and ``4.14`` (where only one item has the number)
@@ -199,7 +203,7 @@ def chosen(names: Iterable[str]) -> list[Item]:
     wanted: set[str] = set()
     problems = []
     for name in names:
-        result = _find(name)
+        result = _matching_item_names(name)
         if len(result) == 1:
             wanted.add(result[0])
         elif result:
@@ -212,17 +216,17 @@ def chosen(names: Iterable[str]) -> list[Item]:
     return [item for item in ITEMS if not wanted or item.name in wanted]
 
 
-def _find(name: str) -> list[str]:
-    """Return the names of the items that a name may mean."""
-    kind, number = _parts(name)
+def _matching_item_names(name: str) -> list[str]:
+    """Return the names of all items that a name given by the user may mean."""
+    kind, number = _kind_and_number(name)
     if (kind, number) in _ALSO:
         return [_ALSO[kind, number]]
-    parts = {item.name: _parts(item.name) for item in ITEMS}
+    parts = {item.name: _kind_and_number(item.name) for item in ITEMS}
     return [full for full, (k, n) in parts.items() if n == number and kind in ("", k)]
 
 
-def _parts(name: str) -> tuple[str, str]:
-    """Return ``("fig", "4.14")`` of any spelling of it."""
+def _kind_and_number(name: str) -> tuple[str, str]:
+    """Return kind and number of an item's name in any spelling, such as fig and 4.14."""
     match = re.fullmatch(r"([a-z§]*)[\s._-]*(\d+(?:[._-]\d+)*)", name.strip().lower())
     if match is None:
         return "", name

@@ -9,29 +9,29 @@ from pydantic import Field
 
 from components.estimation.motion import ConstantVelocity
 from components.messages.columns import ORIGIN, POSITION
-from components.messages.detections import SensorOffer, sensor_offers
+from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.state_tracks import DELETED, StateTracks
-from components.sensor.marks import FUSION
+from components.sensor.palette import FUSION
 from components.track_fusion.fused_tracks import (
     empty_fused_tracks,
     fuse_states,
-    state_tracks,
+    state_tracks_message,
     update_reported,
 )
 from components.track_fusion.local_tracks import (
     LocalTracks,
-    local_tracks,
-    records_of,
+    initial_records,
+    local_tracks_and_rows,
     update_newest,
 )
 from components.track_fusion.track_association import (
     MatchRules,
     drop_strays,
-    leaders,
+    leader_indices,
     match_tracks,
 )
-from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
-from dsa_des.arrays.run_ticks import last_position_in_run
+from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
+from dsa_des.arrays.run_ticks import last_position_at_or_before
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -43,7 +43,9 @@ _TRACKS = 64
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the position of each fused track, and how uncertain it is."""
+    """Return the positions (rows, tracks, 3) of fused tracks in m, and their standard deviation
+    (rows, tracks) in m, for a ladder of models.
+    """
     position = np.full((len(wake), _TRACKS, 3), np.nan)
     spread = np.full((len(wake), _TRACKS), np.nan)
     reported: Any = block.run(wake)
@@ -116,7 +118,7 @@ class IntersectionParameters(Parameters):
 
 
 class CovarianceIntersection(Component):
-    """Makes one track of those that several trackers have of a target.
+    """Fuses the tracks that several trackers have of one target into one track.
 
     Which tracks are of one target is decided by what they say of it. Fused tracks bear numbers of
     their own, in a frame of their own: that of the first track to come. What is known of a target
@@ -146,7 +148,7 @@ class CovarianceIntersection(Component):
         self.trackers = tuple(sorted(on))
         here = np.array([on[name] == self.context.platform for name in self.trackers])
         self._on_board = here if here.any() else ~here
-        offers = sensor_offers(self.context.producers)
+        offers = offers_of_fused_sensors(self.context.producers)
         ranged = {n for n, o in offers.items() if isinstance(o, SensorOffer) and o.measures_range}
         self.sensors = tuple(sorted(offers, key=lambda name: (name not in ranged, name)))
         self._rules = MatchRules(
@@ -156,22 +158,22 @@ class CovarianceIntersection(Component):
             self.p.stay_factor,
             None if self._on_board.all() else tuple(on[name] for name in self.trackers),
         )
-        self._records = records_of(np.empty(0, dtype=np.int64))
+        self._records = initial_records(np.empty(0, dtype=np.int64))
         #: By tracker: of each replica, the newest instant that it reported of.
         self._newest: dict[str, IntArray] = {}
-        self._local = LocalTracks.without_tracks()
+        self._local = LocalTracks.empty_table()
         self._reported = empty_fused_tracks()
         self._tries = Tries()
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return the runs in which it never fused tracks of two trackers."""
+        """Return, by message, the runs in which two trackers had tracks but none were fused."""
         return self._tries.failure_counts(
             "two trackers or more have tracks, and it never puts two of them together", of_two=True
         )
 
     def offer(self, port: str) -> Any:
-        """Return the sensors' declarations by name."""
-        return sensor_offers(self.context.producers)
+        """Return the offers of all sensors behind the trackers, by sensor name."""
+        return offers_of_fused_sensors(self.context.producers)
 
     def run(self, wake: Wake) -> StateTracks | None:
         """Process the trackers' reports in order of time, and return the fused tracks."""
@@ -179,21 +181,22 @@ class CovarianceIntersection(Component):
             new.source: self._select_newest_reports(new, wake) for new in wake.arrivals("tracks")
         }
         row_of = {
-            name: last_position_in_run(wake.instants, new.instants) for name, new in came.items()
+            name: last_position_at_or_before(wake.instants, new.instants)
+            for name, new in came.items()
         }
         rows = np.unique(np.concatenate([np.empty(0, dtype=np.int64), *row_of.values()]))
         if len(rows) == 0:
             return None
         replica = wake.run[rows]
-        records = self._records_of(np.unique(replica), came, row_of, wake)
-        new, reported_at = self._reports(wake, came, row_of, records)
+        records = self._records_of_replicas(np.unique(replica), came, row_of, wake)
+        new, reported_at = self._reported_tracks_and_rows(wake, came, row_of, records)
         local, reported = (
             self._local.rows_of_runs(records.replica),
             self._reported.rows_of_runs(records.replica),
         )
         parts = []
-        for at in occurrences_by_turn(replica):
-            local, records = self._take_in(
+        for at in indices_by_occurrence(replica):
+            local, records = self._update_local_tracks(
                 local, records, new.take(np.isin(new.row, rows[at])), reported_at, rows[at],
                 replica[at],
             )  # fmt: skip
@@ -205,31 +208,31 @@ class CovarianceIntersection(Component):
         self._records = self._records.replace_runs(runs, records, first)
         self._local = self._local.replace_runs(runs, local, first)
         self._reported = self._reported.replace_runs(runs, reported, first)
-        return state_tracks(
+        return state_tracks_message(
             KeyedTable.concatenate(parts), rows, wake.instants.take(rows), self.sensors
         )
 
     def _select_newest_reports(self, new: Arrivals, wake: Wake) -> Arrivals:
-        """Return the reports that count: none that another one overtook, one at an instant."""
+        """Return the reports to use: each tracker's newest at an instant, none overtaken."""
         made, replica = new.message.tick, new.message.run
         newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
         more = max(int(replica[-1]) + 1 - len(newest), 0)
         newest = np.append(newest, np.full(more, np.iinfo(np.int64).min))
-        so_far = np.maximum(new.message.instants.newest().tick, newest[replica])
+        so_far = np.maximum(new.message.instants.running_latest().tick, newest[replica])
         kept = made >= so_far
         next_ = (new.tick[1:] == new.tick[:-1]) & (replica[1:] == replica[:-1])
         kept[:-1] &= ~(next_ & kept[1:])
-        ends = new.instants.last_of_each
+        ends = new.instants.last_position_of_runs
         newest[replica[ends]] = so_far[ends]
         self._newest = {**self._newest, new.source: newest}
         which = np.flatnonzero(kept)
         return Arrivals(new.source, new.instants.take(which), new.message.take(which))
 
-    def _records_of(
+    def _records_of_replicas(
         self, replicas: IntArray, came: dict[str, Arrivals], row_of: dict[str, IntArray], wake: Wake
     ) -> KeyedTable:
-        """Return what is kept of replicas; the frame of a new one is that of its first track."""
-        records = records_of(replicas)
+        """Return the replicas' records; a new one's frame has its first track's origin."""
+        records = initial_records(replicas)
         first = np.full(len(replicas), np.iinfo(np.int64).max)
         for name in sorted(came):
             message = came[name].message
@@ -239,19 +242,19 @@ class CovarianceIntersection(Component):
             of, entries = of[sooner], entries[sooner]
             first[of] = row[entries]
             records.origin[:, of] = [getattr(message, column)[entries] for column in ORIGIN]
-        kept = self._records.latest_or_new(records)
+        kept = self._records.kept_rows_or_new(records)
         return kept.with_columns(
             origin=np.where(np.isnan(kept.origin[0]), records.origin, kept.origin)
         )
 
-    def _reports(
+    def _reported_tracks_and_rows(
         self,
         wake: Wake,
         came: dict[str, Arrivals],
         row_of: dict[str, IntArray],
         records: KeyedTable,
     ) -> tuple[LocalTracks, list[IntArray]]:
-        """Return the tracks that came, with their ``row`` of the wake, and each tracker's rows."""
+        """Return all tracks reported in this wake, their rows, and each tracker's report rows."""
         parts = []
         reported_at = [np.empty(0, dtype=np.int64) for _ in self.trackers]
         for name, row in row_of.items():
@@ -259,18 +262,20 @@ class CovarianceIntersection(Component):
             index = self.trackers.index(name)
             origin = records.origin[:, np.searchsorted(records.replica, replica)]
             masks = self._sensor_bits(message.sensors)
-            came_now, of = local_tracks(message, replica, index, origin, masks, self.p.tentative)
+            came_now, of = local_tracks_and_rows(
+                message, replica, index, origin, masks, self.p.tentative
+            )
             parts.append(came_now.with_columns(row=row[of]))
             reported_at[index] = row
         return LocalTracks.concatenate(parts), reported_at
 
     def _sensor_bits(self, sensors: Sequence[str]) -> list[int]:
-        """Return the bit of each of a tracker's sensors among all."""
+        """Return sensors' bits, as integers, in masks over all sensors; unknown ones are added."""
         unknown = [name for name in sensors if name not in self.sensors]
         self.sensors = (*self.sensors, *unknown)
         return [1 << self.sensors.index(name) for name in sensors]
 
-    def _take_in(
+    def _update_local_tracks(
         self,
         local: LocalTracks,
         records: KeyedTable,
@@ -279,8 +284,10 @@ class CovarianceIntersection(Component):
         at: IntArray,
         replica: IntArray,
     ) -> tuple[LocalTracks, KeyedTable]:
-        """Return what trackers hold after the reports of some rows, one of each replica."""
-        new = new.copy_systems(local)
+        """Return the trackers' tracks and the records after reports at one row per replica: old
+        reports replaced, tracks matched anew.
+        """
+        new = new.copy_fused_numbers(local)
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
@@ -306,10 +313,10 @@ class CovarianceIntersection(Component):
         at: IntArray,
         replica: IntArray,
     ) -> KeyedTable:
-        """Return what is reported of the replicas of some rows."""
+        """Return the fused tracks to report for some replicas, those that ended as deleted."""
         mine = local.take(np.isin(local.replica, replica))
         if len(self.trackers) > 1:
-            leader, of = leaders(mine)
+            leader, of = leader_indices(mine)
             trackers = np.zeros(len(leader), dtype=np.int64)
             np.bitwise_or.at(trackers, of, np.int64(1) << mine.tracker)
             self._tries = self._tries.add_tries(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from components.estimation.batched import multiply_by_transpose, product, times
+from components.estimation.batched import matrix_times_vector, multiply_by_transpose, product
 from components.estimation.covariance_intersection import Rule, intersect_covariances, inverse
 from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind, linearise
@@ -17,17 +17,18 @@ from components.messages.state_tracks import (
     StateTracks,
 )
 from components.track_fusion.local_tracks import LocalTracks
-from components.track_fusion.track_association import bearing, leaders
+from components.track_fusion.track_association import leader_indices, linearised_direction
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks, positions_among
+from dsa_des.arrays.run_ticks import RunTicks, positions_with_found_mask
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
 
 
 def fuse_states(
     tracks: LocalTracks, time_s: FloatArray, motion: ConstantVelocity, rule: Rule
 ) -> KeyedTable:
-    """Return the fused tracks to which tracks belong, by replica and number (``track``).
+    """Return a table of fused tracks, one for each group of tracks with the same replica and
+    number, with state, covariance and status.
 
     ``existence`` is the largest of any member: as much is sure whatever they have in common.
     ``newest`` is the index of the member that gives the direction where there is no range; there
@@ -35,9 +36,9 @@ def fuse_states(
     Members with a range come first, then those without, each group by tracker; each is combined
     with what those before it gave.
     """
-    leader, of = leaders(tracks)
+    leader, of = leader_indices(tracks)
     count = len(leader)
-    rank = _ranks(tracks, of)
+    rank = _ranks_in_fused_track(tracks, of)
     state, covariance = tracks.predict_to(time_s, motion)
     x, p = state[:, leader].copy(), covariance[:, :, leader].copy()
     for turn in range(1, int(rank.max(initial=0)) + 1):
@@ -49,12 +50,12 @@ def fuse_states(
             into = of[mine]
             if ranged:
                 information = inverse(covariance[:, :, mine])
-                pull = times(information, state[:, mine] - x[:, into])
+                pull = matrix_times_vector(information, state[:, mine] - x[:, into])
             else:
-                angles = bearing(tracks.take(mine), x[:, into], time_s[mine])
+                angles = linearised_direction(tracks.take(mine), x[:, into], time_s[mine])
                 weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
                 information = product(weighed, angles.jacobian)
-                pull = times(weighed, angles.residual)
+                pull = matrix_times_vector(weighed, angles.residual)
             shift, result, _ = intersect_covariances(p[:, :, into], information, pull, rule)
             x[:, into] += shift
             p[:, :, into] = result
@@ -76,7 +77,7 @@ def fuse_states(
         has_range=tracks.ranged[leader],
         state=x,
         covariance=p,
-        newest=_newest(tracks, of, count),
+        newest=_newest_member(tracks, of, count),
         state_s=time_s[leader],
         updated_s=updated_s,
         updated_by=updated_by,
@@ -84,8 +85,8 @@ def fuse_states(
     )
 
 
-def _ranks(tracks: LocalTracks, of: IntArray) -> IntArray:
-    """Return the rank of each member in its fused track: by range, then by tracker."""
+def _ranks_in_fused_track(tracks: LocalTracks, of: IntArray) -> IntArray:
+    """Return each track's position in its fused track: with a range first, then by tracker."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, of))
     counts = np.bincount(of)
     rank = np.empty(len(of), dtype=np.int64)
@@ -93,7 +94,7 @@ def _ranks(tracks: LocalTracks, of: IntArray) -> IntArray:
     return rank
 
 
-def _newest(tracks: LocalTracks, of: IntArray, count: int) -> IntArray:
+def _newest_member(tracks: LocalTracks, of: IntArray, count: int) -> IntArray:
     order = np.lexsort((-tracks.tracker, tracks.time_s, of))
     return order[np.cumsum(np.bincount(of, minlength=count)) - 1]
 
@@ -106,7 +107,7 @@ _NUMBERS = (
 
 
 def empty_fused_tracks() -> KeyedTable:
-    """Return the columns of no track."""
+    """Return a table of fused tracks with no row."""
     shapes = {"state": (6,), "covariance": (6, 6), "own": (3,), "origin": (3,)}
     floats = dict.fromkeys((*_NUMBERS, *shapes), float)
     return KeyedTable.empty({**dict.fromkeys(_WHOLE, int), **floats, "has_range": bool}, shapes)
@@ -121,10 +122,10 @@ def update_reported(
     replica: IntArray,
     row_of_replica: IntArray,
 ) -> KeyedTable:
-    """Return the reported fused tracks, and once more those that were deleted."""
+    """Return fused tracks to report: current ones, and reported ones ended since, as deleted."""
     count, ranged = len(fused), fused.has_range
     keys, old_keys = (RunTicks(one.replica, one.track) for one in (fused, before))
-    old, known = positions_among(old_keys, keys)
+    old, known = positions_with_found_mask(old_keys, keys)
     known = np.ones(count, dtype=bool) if known is None else known
     born_s, contributors = fused.state_s.copy(), fused.contributors.copy()
     born_s[known] = before.born_s[old[known]]
@@ -133,7 +134,7 @@ def update_reported(
     seen, by_state = linearise(Kind(False), fused.state, SensorPose(own_m, axes))
     spread = multiply_by_transpose(product(by_state, fused.covariance[:3, :3]), by_state)
     newest = members.take(fused.newest)
-    azimuth, elevation = newest.direction()
+    azimuth, elevation = newest.direction_in_frame_rad()
     state_s = np.where(ranged, fused.state_s, newest.time_s)
     columns = {name: fused.columns[name] for name in fused.columns if name != "newest"}
     new = KeyedTable(**columns).with_columns(
@@ -151,7 +152,7 @@ def update_reported(
         state_s=state_s,
         age_s=np.maximum(state_s - born_s, 0.0),
     )
-    _, goes_on = positions_among(keys, old_keys)
+    _, goes_on = positions_with_found_mask(keys, old_keys)
     if goes_on is None or len(before) == 0:
         return new
     last = before.take(~goes_on)
@@ -162,17 +163,17 @@ def update_reported(
     return KeyedTable.concatenate([last, new])
 
 
-def state_tracks(
+def state_tracks_message(
     reported: KeyedTable, rows: IntArray, instants: RunTicks, sensors: tuple[str, ...]
 ) -> StateTracks:
-    """Return the message of what is reported at some rows."""
+    """Return the message that reports the fused tracks at the given rows."""
     order = np.lexsort((reported.track, reported.row))
     reported = reported.take(order)
     names = [name for name in (*_WHOLE, *_NUMBERS) if name not in ("replica", "row", "born_s")]
     return StateTracks(
         tick=instants.tick,
         run=instants.run,
-        offsets=offsets_of(np.searchsorted(rows, reported.row), len(rows)),
+        offsets=offsets_from_entry_rows(np.searchsorted(rows, reported.row), len(rows)),
         has_range=reported.has_range,
         covariance={name: reported.covariance[index] for index, name in COVARIANCE.items()},
         extras={},

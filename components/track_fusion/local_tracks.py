@@ -5,12 +5,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from components.estimation.batched import times
+from components.estimation.batched import matrix_times_vector
 from components.estimation.frame import SensorPose, frame_change
 from components.estimation.motion import ConstantVelocity
 from components.geometry import unit_vector_unchecked
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
-from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
+from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, covariance_matrices
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -31,8 +31,8 @@ class LocalTracks(KeyedTable):
     """
 
     @classmethod
-    def without_tracks(cls) -> Self:
-        """Return no tracks."""
+    def empty_table(cls) -> Self:
+        """Return a table of local tracks with no row."""
         whole = ("replica", "tracker", "number", "system", "status", "contributors", "updated_by",
                  "row")  # fmt: skip
         numbers = (
@@ -43,39 +43,39 @@ class LocalTracks(KeyedTable):
         floats = dict.fromkeys((*numbers, *shapes), float)
         return cls.empty({**dict.fromkeys(whole, int), **floats, "ranged": bool}, shapes)
 
-    def key(self) -> IntArray:
-        """Return a number for each that no other track bears, also later."""
+    def unique_numbers(self) -> IntArray:
+        """Return an integer per track that identifies it among all runs, trackers and times."""
         trackers = 64
         return (self.replica * trackers + self.tracker) * _NUMBERS + self.number
 
     def predict_to(
         self, time_s: FloatArray, motion: ConstantVelocity
     ) -> tuple[FloatArray, FloatArray]:
-        """Return states and covariances at instants (n,) that are not before their own."""
+        """Return states (6, n), covariances (6, 6, n) at instants (s), none before the track's."""
         return motion.predict(self.state, self.covariance, time_s - self.time_s)
 
-    def copy_systems(self, old: Self) -> Self:
-        """Return the tracks with the fused tracks that they belonged to before."""
+    def copy_fused_numbers(self, old: Self) -> Self:
+        """Return these tracks with their fused track's number in an older table, else 0."""
         if len(old) == 0 or len(self) == 0:
             return self
-        known = old.key()
+        known = old.unique_numbers()
         order = np.argsort(known)
-        mine = self.key()
+        mine = self.unique_numbers()
         index = order[np.minimum(np.searchsorted(known[order], mine), len(known) - 1)]
         return self.with_columns(system=np.where(known[index] == mine, old.system[index], 0))
 
     def pose(self) -> SensorPose:
-        """Return from where, and along which axes, each reports its direction."""
+        """Return position and axes of the sensors that the tracks' directions are measured from."""
         return SensorPose(self.own_m, self.turn.swapaxes(0, 1))
 
-    def direction(self) -> tuple[FloatArray, FloatArray]:
-        """Return azimuth and elevation along the frame's axes."""
+    def direction_in_frame_rad(self) -> tuple[FloatArray, FloatArray]:
+        """Return azimuth from north and elevation (rad) of tracks' directions in replica frames."""
         unit = np.stack(unit_vector_unchecked(self.azimuth_rad, self.elevation_rad))
-        north, east, down = times(self.turn, unit)
+        north, east, down = matrix_times_vector(self.turn, unit)
         return np.arctan2(east, north), np.arctan2(-down, np.hypot(north, east))
 
 
-def local_tracks(
+def local_tracks_and_rows(
     message: StateTracks,
     replica: IntArray,
     tracker: int,
@@ -83,7 +83,7 @@ def local_tracks(
     masks: Sequence[int],
     tentative: bool,
 ) -> tuple[LocalTracks, IntArray]:
-    """Return the tracks of a message in the frames of their replicas, and the row of each."""
+    """Return a message's live tracks, in their replicas' frames, and each one's message row."""
     row = message.row_of_entries
     kept = message.track_status != DELETED
     if not tentative:
@@ -97,7 +97,7 @@ def local_tracks(
     ranged = column("has_range")
     state = np.stack([np.where(ranged, column(name), 0.0) for name in STATE])
     one = np.eye(6)[:, :, np.newaxis]
-    covariance = np.where(ranged, full_covariance(message.covariance, which), one)
+    covariance = np.where(ranged, covariance_matrices(message.covariance, which), one)
     change = frame_change(np.stack([column(name) for name in ORIGIN]), origin_deg_m[:, row])
     result = LocalTracks(
         replica=replica[row],
@@ -124,15 +124,16 @@ def local_tracks(
 
 
 def _map_sensor_masks(mask: IntArray, masks: Sequence[int]) -> IntArray:
-    """Return masks over a tracker's own sensors as masks over those of all."""
+    """Return bit masks over all sensors, given bit masks over one tracker's own sensors."""
     result = np.zeros(len(mask), dtype=np.int64)
     for i, bit in enumerate(masks):
         result |= np.where(mask >> i & 1 == 1, np.int64(bit), 0)
     return result
 
 
-def records_of(replicas: IntArray) -> KeyedTable:
-    """Return what is kept of each run beside its tracks, before the first of them.
+def initial_records(replicas: IntArray) -> KeyedTable:
+    """Return a table with one initial record per run: frame origin, next track number, newest
+    instant and ownship position.
 
     ``origin`` (3, n) of its frame is latitude, longitude and height in deg and m, ``time_s`` the
     newest instant that any track spoke of, and ``own_m`` (3, n) where the ownship was at ``own_s``,
@@ -151,7 +152,7 @@ def records_of(replicas: IntArray) -> KeyedTable:
 
 
 def update_newest(records: KeyedTable, new: LocalTracks, on_board: BoolArray) -> KeyedTable:
-    """Return records that know the newest instant, and where the ownship is.
+    """Return the newest instant's records of any track, and the ownship's position there.
 
     `on_board` says of each tracker whether it is.
     """

@@ -11,8 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.association.assignment import gate_threshold, global_nearest
-from components.estimation.batched import cholesky, distance_squared, multiply_by_transpose, product
+from components.association.assignment import gate_threshold, global_nearest_pairs
+from components.estimation.batched import (
+    cholesky,
+    mahalanobis_squared,
+    multiply_by_transpose,
+    product,
+)
 from components.estimation.measurement import Kind, linearise, residual
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
@@ -23,7 +28,7 @@ _DIRECTION = Kind(has_range=False)
 
 @dataclass(frozen=True)
 class MatchRules:
-    """When tracks are of one target."""
+    """Rules by which tracks of different trackers are taken to be of one target."""
 
     gate_probability: float  # That two tracks of one target lie in each other's gate
     motion: ConstantVelocity  # How targets move from the instant of one track to that of another
@@ -36,7 +41,7 @@ class MatchRules:
 
 @dataclass(frozen=True, eq=False)
 class Bearing:
-    """What a direction says of states at another instant."""
+    """Residual, Jacobian and variance of a track's direction for a state at another instant."""
 
     # (2, n), azimuth and elevation as reported, less those of the state carried back to their
     # instant
@@ -45,8 +50,10 @@ class Bearing:
     variance: FloatArray  # (2, n)
 
 
-def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
-    """Return how the tracks' directions constrain states (6, n) at instants (n,)."""
+def linearised_direction(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
+    """Return, for each track that gives a direction, the residual, Jacobian and variance of that
+    direction with respect to a state at another instant.
+    """
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]
@@ -59,10 +66,10 @@ def bearing(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Beari
     )
 
 
-def gate_share(
+def gate_distance_ratio(
     rules: MatchRules, leader: LocalTracks, other: LocalTracks, time_s: FloatArray
 ) -> FloatArray:
-    """Return the squared distances of pairs over those of their gates."""
+    """Return pairs' squared statistical distance over the gate's threshold: at most 1 inside."""
     share = np.empty(len(leader))
     both, one = leader.ranged & other.ranged, leader.ranged ^ other.ranged
     none = ~(leader.ranged | other.ranged)
@@ -70,7 +77,7 @@ def gate_share(
         mine, theirs = leader.take(both), other.take(both)
         x, p = mine.predict_to(time_s[both], rules.motion)
         y, q = theirs.predict_to(time_s[both], rules.motion)
-        share[both] = distance_squared(cholesky(p + q), x - y) / gate_threshold(
+        share[both] = mahalanobis_squared(cholesky(p + q), x - y) / gate_threshold(
             rules.gate_probability, 6
         )
     two = gate_threshold(rules.gate_probability, 2)
@@ -80,36 +87,41 @@ def gate_share(
         theirs = LocalTracks.concatenate([other.take(one & ~swap), leader.take(swap)])
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
         x, p = mine.predict_to(when, rules.motion)
-        angles = bearing(theirs, x, when)
+        angles = linearised_direction(theirs, x, when)
         spread = multiply_by_transpose(product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
             spread[i, i] += angles.variance[i]
-        result = distance_squared(cholesky(spread), angles.residual) / two
+        result = mahalanobis_squared(cholesky(spread), angles.residual) / two
         result[_may_be_oneself(rules, mine, theirs, x, p)] = np.inf
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = result
     if none.any():
-        share[none] = _bearing_distances(rules, leader.take(none), other.take(none)) / two
+        share[none] = _squared_bearing_distances(rules, leader.take(none), other.take(none)) / two
     return share
 
 
 def _may_be_oneself(
     rules: MatchRules, ranged: LocalTracks, seen: LocalTracks, x: FloatArray, p: FloatArray
 ) -> BoolArray:
-    """Return which tracks with a range may be of whoever sees the others.
+    """Return a mask: True where the track with a range may be the very platform whose sensor
+    measures the other track's direction.
 
     Of such a one each direction is likely. Who has it sees from elsewhere: nobody sees itself.
     """
     if rules.platforms is None:
         return np.zeros(len(ranged), dtype=bool)
     on = np.unique(rules.platforms, return_inverse=True)[1]
-    near = distance_squared(cholesky(p[:3, :3]), x[:3] - seen.own_m)
+    near = mahalanobis_squared(cholesky(p[:3, :3]), x[:3] - seen.own_m)
     gate = gate_threshold(rules.gate_probability, 3)
     return np.asarray((on[ranged.tracker] != on[seen.tracker]) & (near <= gate))
 
 
-def _bearing_distances(rules: MatchRules, one: LocalTracks, other: LocalTracks) -> FloatArray:
-    apart = residual(np.stack(one.direction()), np.stack(other.direction()))
+def _squared_bearing_distances(
+    rules: MatchRules, one: LocalTracks, other: LocalTracks
+) -> FloatArray:
+    apart = residual(
+        np.stack(one.direction_in_frame_rad()), np.stack(other.direction_in_frame_rad())
+    )
     turned = (rules.bearing_rate_rad_s * (one.time_s - other.time_s)) ** 2
     level = np.maximum(np.cos(one.elevation_rad) ** 2, 1e-12)
     spread = np.stack(
@@ -122,8 +134,8 @@ def _bearing_distances(rules: MatchRules, one: LocalTracks, other: LocalTracks) 
     return np.asarray(square[0] + square[1])
 
 
-def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
-    """Return the leader of every fused track, and of every track its index."""
+def leader_indices(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
+    """Return each fused track's leader (index), and for each track its fused track among them."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
     replica, system = tracks.replica[order], tracks.system[order]
     first = np.ones(len(order), dtype=bool)
@@ -134,16 +146,16 @@ def leaders(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
 
 
 def drop_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
-    """Return tracks, of which those no longer belong that are too far from their leader."""
+    """Return the tracks, with fused track number 0 for those too far from their leader now."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return tracks
-    leader, of = leaders(tracks.take(member))
+    leader, of = leader_indices(tracks.take(member))
     lead = member[leader[of]]
     pair = np.flatnonzero(lead != member)
     if len(pair) == 0:
         return tracks
-    share = gate_share(
+    share = gate_distance_ratio(
         rules, tracks.take(lead[pair]), tracks.take(member[pair]), time_s[member[pair]]
     )
     system = tracks.system.copy()
@@ -159,7 +171,7 @@ def match_tracks(
     next_number: IntArray,
     replica: IntArray,
 ) -> tuple[LocalTracks, IntArray]:
-    """Return tracks that all belong to a fused one, and the next number of each replica.
+    """Return the tracks with old or new fused track numbers, and each replica's next number.
 
     Tracker by tracker, its tracks that belong nowhere, or stand alone, are assigned to the fused
     tracks that have none of it: the least sum of distances, none beyond its gate. One that stands
@@ -174,7 +186,7 @@ def match_tracks(
         free = np.flatnonzero(mine & ((system == 0) | alone))
         if len(free) == 0:
             continue
-        _join(rules, now, free, time_s, system)
+        _assign_to_fused_tracks(rules, now, free, time_s, system)
         new = free[system[free] == 0]
         new = new[np.lexsort((tracks.number[new], tracks.replica[new]))]
         index = np.searchsorted(replica, tracks.replica[new])
@@ -186,27 +198,29 @@ def match_tracks(
 
 
 def _is_only_member(tracks: LocalTracks) -> BoolArray:
-    """Return which tracks are the only member of their fused track."""
+    """Return a mask over tracks: True where no other track belongs to the same fused track."""
     result = np.zeros(len(tracks), dtype=bool)
     member = np.flatnonzero(tracks.system > 0)
     if len(member):
-        leader, of = leaders(tracks.take(member))
+        leader, of = leader_indices(tracks.take(member))
         result[member] = (np.bincount(of, minlength=len(leader)) == 1)[of]
     return result
 
 
-def _join(
+def _assign_to_fused_tracks(
     rules: MatchRules,
     tracks: LocalTracks,
     free: IntArray,
     time_s: FloatArray,
     system: IntArray,
 ) -> None:
-    """Write into `system` which fused tracks some tracks of one tracker now belong to."""
+    """Write into `system` the fused track that each free track of one tracker is assigned to, if
+    one is near enough.
+    """
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return
-    leader, of = leaders(tracks.take(member))
+    leader, of = leader_indices(tracks.take(member))
     tracker = tracks.tracker[free[0]]
     taken = np.bincount(of, weights=tracks.tracker[member] == tracker, minlength=len(leader)) > 0
     lead = member[leader[~taken]]
@@ -220,10 +234,10 @@ def _join(
     candidate, which = candidate[older], which[older]
     if len(candidate) == 0:
         return
-    share = gate_share(
+    share = gate_distance_ratio(
         rules, tracks.take(lead[which]), tracks.take(free[candidate]), time_s[free[candidate]]
     )
     inside = share <= 1.0
     candidate, which, share = candidate[inside], which[inside], share[inside]
-    won = global_nearest(which, candidate, share, 1.0)
+    won = global_nearest_pairs(which, candidate, share, 1.0)
     system[free[candidate[won]]] = tracks.system[lead[which[won]]]

@@ -13,22 +13,22 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.association.assignment import (
-    alone,
     gate_threshold,
-    global_nearest,
-    nearest,
+    global_nearest_pairs,
+    is_only_pair_of_both,
+    nearest_pairs,
 )
 from components.association.jpda import marginals
-from components.estimation.batched import is_everything, log_determinant, select_tracks
-from components.estimation.estimator import Estimates, innovation_squared
+from components.estimation.batched import is_everything, log_determinant_from_root, select_tracks
+from components.estimation.estimator import Estimates, mixture_innovation_squared
 from components.estimation.frame import SensorPose
-from components.estimation.iterated import iterate
+from components.estimation.iterated import iterate_updates_in_place
 from components.estimation.modified_polar import (
-    add_first_range,
-    correct_by_rotation,
-    correct_in_polar,
+    apply_correction_by_rotation,
+    apply_correction_in_polar,
+    update_with_first_range,
 )
-from components.tracking.gating import GatedPairs, log_density, log_gain
+from components.tracking.gating import GatedPairs, log_false_alarm_density, log_score_gain
 from components.tracking.management import start_estimates
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import TELLS, LookBatch
@@ -60,8 +60,8 @@ class Candidates:
     pose: SensorPose  # Of each track's look
 
     @cached_property
-    def sensors(self) -> IntArray:
-        """Mask of the sensors of each detection."""
+    def sensor_masks(self) -> IntArray:
+        """Bit mask, per detection, of the sensors that contributed to it."""
         return self.batch.contributors
 
     @cached_property
@@ -80,26 +80,28 @@ class Candidates:
         return concatenate([one.measured.distance for one in self.kinds])
 
     @cached_property
-    def volume(self) -> FloatArray:
-        """Logarithm of false alarms in the volume of |S|, by which kinds are comparable."""
+    def log_volume_cost(self) -> FloatArray:
+        """Cost of each pair's gate volume: ln |S| plus the log density of false alarms, which makes
+        different kinds of measurement comparable.
+        """
         return np.concatenate(
             [
                 _log_volume(one)
-                + 2.0 * log_density(self.rules, one, self.sensors)
+                + 2.0 * log_false_alarm_density(self.rules, one, self.sensor_masks)
                 + one.kind.size * _LOG_2_PI
                 for one in self.kinds
             ]
         )
 
     @cached_property
-    def cost_of_none(self) -> FloatArray:
-        """Of each pair, what it costs its track to go without: the widest gate that it has."""
+    def cost_of_no_detection(self) -> FloatArray:
+        """Cost, per pair, of leaving its track undetected: the largest inside its gates."""
         sizes = np.concatenate([np.full(len(one.track), one.kind.size) for one in self.kinds])
         limits = np.zeros(8)
         for many in range(2, 8):
             limits[many] = gate_threshold(self.rules.p.gate_probability, many)
         price = np.full(int(self.track.max()) + 1, -np.inf)
-        np.maximum.at(price, self.track, limits[sizes] + self.volume)
+        np.maximum.at(price, self.track, limits[sizes] + self.log_volume_cost)
         return price[self.track]
 
 
@@ -107,7 +109,7 @@ class Association(Protocol):
     """Decides which detections belong to which tracks."""
 
     def update(self, pairs: Candidates) -> Associated:
-        """Return the predicted tracks after the detections in their gates."""
+        """Return tracks updated with detections in gates, mask of tracks hit, and gain of score."""
         ...
 
 
@@ -115,16 +117,16 @@ class OneToOne(Association, Protocol):
     """Gives every track at most one detection, and every detection to at most one track."""
 
     def taken(self, pairs: Candidates) -> IntArray:
-        """Return the pairs that are taken, ascending; no track and no detection is in two."""
+        """Return ascending indices of pairs chosen; no track and no detection is chosen twice."""
         ...
 
     def update(self, pairs: Candidates) -> Associated:
         """Return tracks, each updated by at most one detection."""
-        rules, part, kinds, sensors = pairs.rules, pairs.tracks, pairs.kinds, pairs.sensors
+        rules, part, kinds, sensors = pairs.rules, pairs.tracks, pairs.kinds, pairs.sensor_masks
         hit, gain = np.zeros(len(part), dtype=bool), np.zeros(len(part))
         if not kinds:
             return part, hit, gain
-        if bool(alone(pairs.track, pairs.detection).all()):
+        if bool(is_only_pair_of_both(pairs.track, pairs.detection).all()):
             taken = np.arange(len(pairs.track))
         else:
             taken = self.taken(pairs)
@@ -140,15 +142,15 @@ class OneToOne(Association, Protocol):
                 mine = mine[np.argsort(which)]
                 which = one.track[mine]
             estimates = rules.estimator.update(part.estimates(), which, one.measured, mine)
-            correct_by_pairs(pairs, which, one, mine, estimates)
+            correct_nonlinear_updates(pairs, which, one, mine, estimates)
             mask = sensors[one.detection[mine]]
-            gain[which] = log_gain(rules, part, one, sensors)[mine]
+            gain[which] = log_score_gain(rules, part, one, sensors)[mine]
             hit[which] = True
             before: dict[str, Any] = part.columns if is_everything(which, len(part)) else {
                 name: select_tracks(part.columns[name], which)
                 for name in ("contributors", "ranged", "nis", "freedom", "weights")
             }  # fmt: skip
-            nis = innovation_squared(one.measured, before["weights"], mine)
+            nis = mixture_innovation_squared(one.measured, before["weights"], mine)
             new = {
                 **estimate_columns(estimates),
                 "contributors": before["contributors"] | mask,
@@ -167,17 +169,17 @@ class Nearest(OneToOne):
     """Takes the nearest pair first."""
 
     def taken(self, pairs: Candidates) -> IntArray:
-        """Return the pairs that are taken."""
-        return nearest(pairs.track, pairs.detection, pairs.distance)
+        """Return the pairs chosen by repeatedly taking the nearest remaining pair (indices)."""
+        return nearest_pairs(pairs.track, pairs.detection, pairs.distance)
 
 
 class GlobalNearest(OneToOne):
     """Takes the pairs of the least sum over all (global nearest neighbour)."""
 
     def taken(self, pairs: Candidates) -> IntArray:
-        """Return the pairs that are taken."""
-        cost = pairs.distance + pairs.volume
-        return global_nearest(pairs.track, pairs.detection, cost, pairs.cost_of_none)
+        """Return the indices of the pairs chosen so that the sum of their costs is least."""
+        cost = pairs.distance + pairs.log_volume_cost
+        return global_nearest_pairs(pairs.track, pairs.detection, cost, pairs.cost_of_no_detection)
 
 
 class JointProbabilistic(Association):
@@ -191,12 +193,12 @@ class JointProbabilistic(Association):
 
     def update(self, pairs: Candidates) -> Associated:
         """Return tracks updated by all detections in their gates."""
-        rules, part, kinds, sensors = pairs.rules, pairs.tracks, pairs.kinds, pairs.sensors
+        rules, part, kinds, sensors = pairs.rules, pairs.tracks, pairs.kinds, pairs.sensor_masks
         count = len(part)
         if not any(len(one.track) for one in kinds):
             return part, np.zeros(count, dtype=bool), np.zeros(count)
         track, entry = pairs.track, pairs.detection
-        logs = np.concatenate([log_gain(rules, part, one, sensors) for one in kinds])
+        logs = np.concatenate([log_score_gain(rules, part, one, sensors) for one in kinds])
         missing = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
         weight = np.exp(np.minimum(logs - missing, _LARGEST_LOG))
         share = marginals(track, entry, weight, rules.p.jpda_exact_detections)
@@ -207,7 +209,7 @@ class JointProbabilistic(Association):
         for one in kinds:
             which = np.arange(len(one.track))
             updated = rules.estimator.update(part.estimates(), one.track, one.measured, which)
-            correct_by_pairs(pairs, one.track, one, which, updated)
+            correct_nonlinear_updates(pairs, one.track, one, which, updated)
             updates.append(updated)
         merged = rules.estimator.merge(
             part.estimates(), missed, track, share, Estimates.concatenate(updates)
@@ -242,10 +244,11 @@ ASSOCIATIONS: dict[str, Association] = {
 }  # fmt: skip
 
 
-def correct_by_pairs(
+def correct_nonlinear_updates(
     pairs: Candidates, track: IntArray, one: GatedPairs, pair: IntArray, estimates: Estimates
 ) -> None:
-    """Bring corrections of tracks that no Gaussian along straight axes describes right, in place.
+    """Improve, in place, updates of tracks where a linear update is poor: angle-only tracks, large
+    corrections and coarse bearings.
 
     Those of angle-only tracks are brought into modified polar coordinates, and those that went far
     along a tangent of a precise measurement are repeated. What coarse bearings
@@ -257,15 +260,15 @@ def correct_by_pairs(
     angle_only = (~part.ranged[track]).nonzero()[0]
     straight = part.ranged[track]
     if one.own_m_s is None:
-        iterate_far(pairs, track, one, pair, estimates, np.flatnonzero(straight))
+        iterate_far_updates(pairs, track, one, pair, estimates, np.flatnonzero(straight))
     else:
         own_m_s, batch, entry = one.own_m_s[:, pair], pairs.batch, one.detection[pair]
         known = np.isnan(own_m_s[0]) & ~np.isnan(part.own_m_s[0, track])
         reports = batch.code[entry] & TELLS > 0
         own_m_s = np.where(known & ~reports, part.own_m_s[:, track], own_m_s)
         straight = straight & np.isnan(own_m_s[0])
-        iterate_far(pairs, track, one, pair, estimates, np.flatnonzero(straight))
-        turn_coarse(part, track, own_m_s, pose, estimates)
+        iterate_far_updates(pairs, track, one, pair, estimates, np.flatnonzero(straight))
+        rotate_coarse_updates(part, track, own_m_s, pose, estimates)
         anew = np.flatnonzero(known & reports)
         anew = anew[is_arc_bent(part.take(track[anew]), pose.take(track[anew]))]
         if len(anew):
@@ -281,18 +284,18 @@ def correct_by_pairs(
     which = track[angle_only]
     sensor_m = select_tracks(pose.position_m, which)
     after = zip(estimates.states, estimates.covariances, strict=True)
-    for before, (state, covariance) in zip(part.states(), after, strict=True):
-        moved = correct_in_polar(
+    for before, (state, covariance) in zip(part.states_by_model(), after, strict=True):
+        moved = apply_correction_in_polar(
             select_tracks(before, which), select_tracks(state, angle_only),
             select_tracks(covariance, angle_only), sensor_m,
         )  # fmt: skip
         if one.ranges is not None:
             range_m, variance_m2 = (values[pair[angle_only]] for values in one.ranges)
-            moved = add_first_range(*moved, range_m, variance_m2, sensor_m)
+            moved = update_with_first_range(*moved, range_m, variance_m2, sensor_m)
         state[:, angle_only], covariance[:, :, angle_only] = moved
 
 
-def iterate_far(
+def iterate_far_updates(
     pairs: Candidates,
     track: IntArray,
     one: GatedPairs,
@@ -300,7 +303,7 @@ def iterate_far(
     estimates: Estimates,
     which: IntArray,
 ) -> None:
-    """Repeat corrections `which` of those of `correct_by_pairs` that went too far, in place."""
+    """Repeat, in place, updates of tracks `which` corrected too far for one linearisation."""
     if len(which) == 0:
         return
     of, mine, pose = track[which], pair[which], pairs.pose.take(track[which])
@@ -313,8 +316,11 @@ def iterate_far(
             select_tracks(estimates.states[m], which),
             select_tracks(estimates.covariances[m], which),
         )
-        before = select_tracks(part.states()[m], of), select_tracks(part.covariances()[m], of)
-        iterate(
+        before = (
+            select_tracks(part.states_by_model()[m], of),
+            select_tracks(part.covariances_by_model()[m], of),
+        )
+        iterate_updates_in_place(
             one.kind,
             pose,
             before,
@@ -325,17 +331,17 @@ def iterate_far(
         estimates.states[m][:, which], estimates.covariances[m][:, :, which] = after
 
 
-def turn_coarse(
+def rotate_coarse_updates(
     part: TrackStore, track: IntArray, own_m_s: FloatArray, pose: SensorPose, estimates: Estimates
 ) -> None:
-    """Bring corrections of coarse bearings onto arcs, in place; NaN where a bearing is not."""
+    """Turn, in place, coarse-bearing updates about the sensor; not tracks with NaN `own_m_s`."""
     coarse = np.flatnonzero(~np.isnan(own_m_s[0]))
     if not len(coarse):
         return
     which = track[coarse]
     after = zip(estimates.states, estimates.covariances, strict=True)
-    for before, (state, covariance) in zip(part.states(), after, strict=True):
-        state[:, coarse], covariance[:, :, coarse] = correct_by_rotation(
+    for before, (state, covariance) in zip(part.states_by_model(), after, strict=True):
+        state[:, coarse], covariance[:, :, coarse] = apply_correction_by_rotation(
             select_tracks(before, which), select_tracks(state, coarse),
             select_tracks(covariance, coarse),
             select_tracks(pose.position_m, which), own_m_s[:, coarse],
@@ -343,12 +349,13 @@ def turn_coarse(
 
 
 def is_arc_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
-    """Return which tracks are spread so far across the line of sight that an arc is no line.
+    """Return a mask over tracks: True where the spread across the line of sight is so wide that a
+    straight line misses the arc of constant range.
 
     At two deviations a straight line leaves it by `_BENT` of the deviation along it.
     """
     result = np.zeros(len(part), dtype=bool)
-    for state, spread in zip(part.states(), part.covariances(), strict=True):
+    for state, spread in zip(part.states_by_model(), part.covariances_by_model(), strict=True):
         x, y, _ = state[:3] - pose.position_m
         ground = np.maximum(np.hypot(x, y), 1.0)
         cos, sin = x / ground, y / ground
@@ -360,13 +367,13 @@ def is_arc_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
 
 
 def concatenate(parts: Sequence[Any]) -> Any:
-    """Return arrays end to end; a single one as it is."""
+    """Return arrays joined end to end along their first axis; a single one unchanged."""
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
 def _log_volume(one: GatedPairs) -> FloatArray:
     """Return ln |S| of every pair; of several models the least, whose gate is the tightest."""
-    result = log_determinant(one.measured.innovations[0].root)
+    result = log_determinant_from_root(one.measured.innovations[0].root)
     for other in one.measured.innovations[1:]:
-        result = np.minimum(result, log_determinant(other.root))
+        result = np.minimum(result, log_determinant_from_root(other.root))
     return result

@@ -8,17 +8,17 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.estimation.frame import SensorPose
-from components.estimation.measurement import half_angle_rad
+from components.estimation.measurement import cone_half_angle_rad
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.cues import CueCones
-from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, full_covariance
-from components.sensor.marks import TRACKER
-from dsa_des.arrays.keyed_table import occurrences_by_turn
+from components.messages.state_tracks import DELETED, TENTATIVE, StateTracks, covariance_matrices
+from components.sensor.palette import TRACKER
+from dsa_des.arrays.keyed_table import indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 
 
 class CueParameters(Parameters):
@@ -65,7 +65,7 @@ class CueParameters(Parameters):
 
 
 class Cues(Component):
-    """Sends sensors the cones in which tracks are thought to be.
+    """Sends sensors the cones in which tracked targets are expected.
 
     Each cone comes with the state of its track, so that a sensor carries it on to its own scan.
     While there is no cone, and the last message had none, no message is sent.
@@ -90,7 +90,7 @@ class Cues(Component):
         self._wide = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how many tracks were too uncertain to cue, by run."""
+        """Return the number of tracks per run that were too uncertain to send a cone for."""
         what = f"a track's cone is wider than most_half_angle_deg ({self.p.most_half_angle_deg:g})"
         return {f"{what} and cues none": self._wide}
 
@@ -107,14 +107,14 @@ class Cues(Component):
         return self._message(wake, tracks, rows, row[due], entry[due], half_rad[due])
 
     def _due_rows(self, wake: Wake, some: BoolArray) -> IntArray:
-        """Return the rows at which cues are sent, given at which of them there are some."""
+        """Return the wake rows at which cues are sent; `some` is True at rows with a cone."""
         run, tick = wake.run, wake.ticks
         more = max(int(run[-1]) + 1 - len(self._silent), 0)
         if more:
             self._last_tick = np.append(self._last_tick, np.full(more, -self._every_ticks))
             self._silent = np.append(self._silent, np.ones(more, dtype=bool))
         due = np.zeros(len(tick), dtype=bool)
-        for rows in occurrences_by_turn(run):
+        for rows in indices_by_occurrence(run):
             of = run[rows]
             now = (tick[rows] - self._last_tick[of] >= self._every_ticks) & (
                 some[rows] | ~self._silent[of]
@@ -125,21 +125,23 @@ class Cues(Component):
         return np.flatnonzero(due)
 
     def _cueing_tracks(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return the row and entry of each track that cues, and its cone's half angle."""
+        """Return message row, entry index and cone half angle (rad) of each track that is certain
+        enough to send a cone for.
+        """
         wanted = tracks.track_status != DELETED
         if not self.p.tentative:
             wanted &= tracks.track_status != TENTATIVE
         entry = np.flatnonzero(wanted)
         lasts_s = self.p.lasts_s
         state = np.stack([getattr(tracks, name)[entry] for name in STATE])
-        covariance = full_covariance(tracks.covariance, entry)
+        covariance = covariance_matrices(tracks.covariance, entry)
         across = lasts_s * (covariance[:3, 3:] + covariance[3:, :3])
         spread = covariance[:3, :3] + across + lasts_s**2 * covariance[3:, 3:]
         for i in range(3):
             spread[i, i] += self.p.acceleration_intensity_m2_s3 * lasts_s**3 / 3.0
         own = np.stack([getattr(tracks, name)[entry] for name in OWN_POSITION])
         axes = np.repeat(np.eye(3)[:, :, np.newaxis], len(entry), axis=2)
-        half = half_angle_rad(state[:3], spread, SensorPose(own, axes), self.p.sigmas)
+        half = cone_half_angle_rad(state[:3], spread, SensorPose(own, axes), self.p.sigmas)
         level = np.cos(tracks.elevation_rad[entry])
         angular = np.maximum(
             tracks.azimuth_variance_rad2[entry] * level * level,
@@ -150,7 +152,7 @@ class Cues(Component):
         kept = half <= math.radians(self.p.most_half_angle_deg)
         row = tracks.row_of_entries[entry]
         run = tracks.run[row]
-        self._wide = count_cases(self._wide, run[~kept], run)
+        self._wide = add_cases(self._wide, run[~kept], run)
         return row[kept], entry[kept], half[kept]
 
     def _message(
@@ -166,7 +168,7 @@ class Cues(Component):
         return CueCones(
             tick=wake.ticks[rows],
             run=wake.run[rows],
-            offsets=offsets_of(np.searchsorted(rows, row), len(rows)),
+            offsets=offsets_from_entry_rows(np.searchsorted(rows, row), len(rows)),
             half_angle_rad=half_rad,
             until_s=tracks.state_s[entry] + self.p.lasts_s,
             **{name: getattr(tracks, name)[entry] for name in names},

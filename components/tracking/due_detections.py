@@ -27,7 +27,11 @@ from components.messages.state_tracks import DELETED
 from components.tracking.scans import LookBatch
 from components.tracking.track_store import NEVER, TrackStore, tracks_to_report
 from dsa_des.arrays.keyed_table import KeyedTable
-from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, next_position_in_run
+from dsa_des.arrays.run_ticks import (
+    RunTicks,
+    first_position_at_or_after,
+    last_position_at_or_before,
+)
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: A track lives without a detection for so long, s, and for so many promises of its sensors.
@@ -42,14 +46,14 @@ BLIND_AFTER = 5
 
 @dataclass(frozen=True, eq=False)
 class Promises:
-    """In which time sensors report a target again that they see (`SensorOffer.promises`)."""
+    """Times within which sensors promise to report a visible target again, as steps over range."""
 
     steps: tuple[tuple[tuple[float, float], ...], ...]  # Of each sensor
     ticks_per_s: int
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...], ticks_per_s: int) -> Self:
-        """Return the promises of some sensors."""
+        """Return the promises that the named sensors state in their offers, in ticks."""
         known = (offers.get(name) for name in sensors)
         steps = tuple(one.promises if isinstance(one, SensorOffer) else () for one in known)
         return cls(steps, ticks_per_s)
@@ -58,36 +62,38 @@ class Promises:
         """Return whether any does not report at every look."""
         return any(self.steps)
 
-    def ticks(self, sensor: int, range_m: FloatArray) -> FloatArray:
-        """Return the time of targets at some ranges, (n,); 0 at every look."""
+    def promised_ticks(self, sensor: int, range_m: FloatArray) -> FloatArray:
+        """Return a sensor's promised time to report ranges again, ticks; 0 means every look."""
         if not (steps := self.steps[sensor]):
             return np.zeros(len(range_m))
         far, within_s = np.array(steps).T
         step = np.minimum(np.searchsorted(far, range_m), len(far) - 1)
         return np.asarray(within_s[step] * self.ticks_per_s)
 
-    def life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
-        """Return how long tracks live without a detection; `sees` (sensors, n) is who sees them."""
+    def track_life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
+        """Return the ticks each track lives undetected; `sees` (sensors, n) is True where seen."""
         life = np.full(len(range_m), int(LIVES_S * self.ticks_per_s))
         if not self:
             return life
         soonest = np.full(len(range_m), np.inf)
         for sensor, mine in enumerate(sees):
-            promised = LIVES_PROMISES * self.ticks(sensor, range_m)
+            promised = LIVES_PROMISES * self.promised_ticks(sensor, range_m)
             soonest = np.minimum(soonest, np.where(mine, promised, np.inf))
         soonest = np.where(np.isinf(soonest), 0.0, soonest)
         return np.maximum(life, soonest.astype(np.int64))
 
 
 def find_seeing_sensors(misdetections: IntArray) -> BoolArray:
-    """Return which sensors see which tracks, (sensors, n), from their misdetections."""
+    """Return a mask (sensors, tracks): True where the sensor is taken to see the track, by how few
+    of its looks missed it.
+    """
     return np.asarray(
         (misdetections < BLIND_AFTER)
         | ((misdetections == misdetections.min(axis=0)) & (misdetections < NEVER))
     )
 
 
-def expected_looks(
+def is_detection_expected(
     fields: tuple[Reach | None, ...],
     promises: Promises,
     part: TrackStore,
@@ -96,7 +102,8 @@ def expected_looks(
     pose: SensorPose,
     direction: FloatArray | None,
 ) -> BoolArray:
-    """Return which sensors looked where the tracks are that they see, and when they were due.
+    """Return a mask (sensors, tracks): True where the sensor looked, sees this track, has it in its
+    field of view, and a report was due.
 
     (sensors, tracks)
     """
@@ -114,28 +121,31 @@ def expected_looks(
             continue
         looked[i] = (mine >> i & 1).astype(bool) & sees[i]
         if promises:
-            promised = _NEARLY * promises.ticks(i, range_of(part, pose))
+            promised = _NEARLY * promises.promised_ticks(i, range_or_infinity_m(part, pose))
             looked[i] &= part.tick - part.counted_tick[i] >= promised
         if field is None:
             continue
         if where is None:
             if direction is None:
                 direction = expected_measurement(Kind(False), part.state0, pose)
-            away = range_of(part, pose)
+            away = range_or_infinity_m(part, pose)
             where = (*direction, np.where(part.ranged, away, 0.0))
         inside = np.ones(len(part), dtype=bool)
-        looked[i] &= field.decide(*where, inside) == EVALUATE
+        looked[i] &= field.skip_reasons(*where, inside) == EVALUATE
     return looked
 
 
-def range_of(part: TrackStore, pose: SensorPose) -> FloatArray:
-    """Return how far away tracks are that have a range, m; infinite for others."""
+def range_or_infinity_m(part: TrackStore, pose: SensorPose) -> FloatArray:
+    """Return the distance of each track from its sensor, m; infinity for tracks without a range."""
     away = np.sqrt(squared_length(part.state0[:3] - pose.position_m))
     return np.where(part.ranged, away, np.inf)
 
 
-def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray) -> IntArray:
-    """Return each sensor's misdetections since its last hit, after a look.
+def update_misdetection_counts(
+    misdetections: IntArray, by: IntArray, looked: BoolArray
+) -> IntArray:
+    """Return the numbers (sensors, tracks) of misdetections since the last hit, updated by a look:
+    one more where looked, 0 where hit.
 
     `by` is the mask of the sensors that updated each track.
     """
@@ -150,7 +160,7 @@ def misdetection_counts(misdetections: IntArray, by: IntArray, looked: BoolArray
 
 @dataclass(frozen=True, eq=False)
 class Silence:
-    """The rows of a wake at which a tracker is awake and no look is worked on.
+    """Rows of a wake at which a tracker runs without a look to process, so that tracks may end.
 
     They are numbered from 0, those of each run together. Within a second of a look nothing is
     silent: the next look says as much.
@@ -166,11 +176,12 @@ class Silence:
 
     @cached_property
     def silent_instants(self) -> RunTicks:
-        """The instants of silence."""
+        """Run and tick of each silent row."""
         return self.instants.take(self.rows)
 
-    def silence_since_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
-        """Return for works at some rows of the wake the silence since the work before it.
+    def silent_rows_before_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+        """Return, for each processed row of the wake, the first and last silent row between the
+        run's previous work and this row.
 
         It is the silent rows from the first to the second: none where the second is less. `worked`
         is when the last work of each one's run was, before this wake.
@@ -180,20 +191,26 @@ class Silence:
         run, since = at.run[order], worked.copy()
         again = run[1:] == run[:-1]
         since[order[1:][again]] = at.tick[order[:-1][again]]
-        return self._first_silent(at.run, since), last_position_in_run(self.silent_instants, at)
+        return self._first_silent_row(at.run, since), last_position_at_or_before(
+            self.silent_instants, at
+        )
 
-    def silence_after_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the silent rows of some runs from their last work on."""
-        ends = next_position_in_run(self.silent_instants, RunTicks(run + 1, np.zeros_like(run)))
-        return self._first_silent(run, worked), ends - 1
+    def silent_rows_after_work(self, run: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the first and last silent row after the last work of each run."""
+        ends = first_position_at_or_after(
+            self.silent_instants, RunTicks(run + 1, np.zeros_like(run))
+        )
+        return self._first_silent_row(run, worked), ends - 1
 
-    def _first_silent(self, run: IntArray, worked: IntArray) -> IntArray:
-        return next_position_in_run(self.silent_instants, RunTicks(run, worked + self.ticks_per_s))
+    def _first_silent_row(self, run: IntArray, worked: IntArray) -> IntArray:
+        return first_position_at_or_after(
+            self.silent_instants, RunTicks(run, worked + self.ticks_per_s)
+        )
 
     def end_silent_tracks(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray
     ) -> tuple[TrackStore, list[TrackStore]]:
-        """Return the tracks that live on, and what is reported of the runs in which some do not.
+        """Return tracks that stay alive, and ending runs' reports, with the ended ones deleted.
 
         Looked through are the tracks of the runs of `records`, at silent rows of each from `first`
         to `last`.
@@ -201,7 +218,7 @@ class Silence:
         index = np.minimum(records.replica.searchsorted(store.replica), len(records) - 1)
         over = store.updated_tick + store.life_ticks + self.late_ticks
         row = np.maximum(
-            next_position_in_run(self.silent_instants, RunTicks(store.replica, over + 1)),
+            first_position_at_or_after(self.silent_instants, RunTicks(store.replica, over + 1)),
             first[index],
         )
         due = (records.replica[index] == store.replica) & (store.status != DELETED)

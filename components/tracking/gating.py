@@ -13,9 +13,12 @@ from components.estimation.kalman import Moments
 from components.estimation.measurement import Kind, expected_measurement
 from components.geometry import wrap_pi_unchecked
 from components.messages.state_tracks import COASTED, CONFIRMED
-from components.tracking.reported_errors import level_angles, variances_by_angles
+from components.tracking.reported_errors import (
+    angles_in_level_axes,
+    variances_of_azimuth_elevation_range,
+)
 from components.tracking.rules import TrackerRules
-from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
+from components.tracking.scans import TELLS, LookBatch, Scans, kind_and_measured_rows
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -31,7 +34,9 @@ _LEAST_COS = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class GatedPairs:
-    """The pairs of one kind of measurement, by index among all tracks and detections of a step."""
+    """Pairs of a track and a detection in its gate, for one kind of measurement, as indices into
+    all tracks and detections of a step.
+    """
 
     kind: Kind
     track: IntArray
@@ -52,7 +57,8 @@ class GatedPairs:
 def gate_pairs(
     rules: TrackerRules, part: TrackStore, of: IntArray, pose: SensorPose, batch: LookBatch
 ) -> tuple[list[GatedPairs], FloatArray | None, BoolArray]:
-    """Return the pairs of predicted tracks and of detections in their gates, kind by kind.
+    """Return the gated pairs of tracks and detections for each kind of measurement, the expected
+    directions, and a mask of detections in some gate.
 
     `of` is the look of each track, ascending, and `pose` that look's. Also returned are the
     direction that the first model expects of every track, (2, tracks) in body axes, where it was
@@ -64,7 +70,7 @@ def gate_pairs(
     held = np.zeros(len(batch.detection), dtype=bool)
     direction = None
     some_angle_only = bool((~part.ranged).any())
-    linear, on_arc = rules.estimator.linear, ~np.isnan(part.own_m_s[0])
+    linear, on_arc = rules.estimator.linearised, ~np.isnan(part.own_m_s[0])
     apart = linear is not rules.estimator and bool(on_arc.any())
     spread = _PairVariance(rules, part, pose, scans)
     for code in np.bincount(batch.code).nonzero()[0].tolist():
@@ -75,7 +81,7 @@ def gate_pairs(
             (True, False) if apart else (None,),
         )
         for ranged, arc in ways:
-            kind, rows = kind_of(0 if ranged is False else code)
+            kind, rows = kind_and_measured_rows(0 if ranged is False else code)
             estimator = linear if arc else rules.estimator
             moments = estimator.expect(kind, part.estimates(), pose)
             # Moments of sigma points are means over them: not where the state itself is seen.
@@ -99,11 +105,11 @@ def gate_pairs(
                 reported = rules.carried.errors_of_detections(scans, cells).with_track_covariances(
                     part.covariance0.take(track, -1), part.state0[3:6].take(track, -1)
                 )
-                white = rules.carried.white(scans, cells, rows)
-                measured[:2], level_pose = level_angles(measured[:2], pose.take(track))
+                white = rules.carried.new_error_variances(scans, cells, rows)
+                measured[:2], level_pose = angles_in_level_axes(measured[:2], pose.take(track))
                 mine_then = part.take(track)
                 since = np.maximum(mine_then.tick - mine_then.updated_tick, 0) / rules.ticks_per_s
-                ages = rules.carried.ages(scans, cells, since)
+                ages = rules.carried.report_ages(scans, cells, since)
                 foreseen = [
                     replace(
                         ages.add_age_errors(result, model, state, covariance),
@@ -111,19 +117,20 @@ def gate_pairs(
                     )
                     for result, model, state, covariance in zip(
                         estimator.expect(kind, mine_then.estimates(), level_pose, reported),
-                        rules.estimator.models, mine_then.states(), mine_then.covariances(),
+                        rules.estimator.models, mine_then.states_by_model(),
+                        mine_then.covariances_by_model(),
                         strict=True,
                     )
                 ]  # fmt: skip
                 pairs = pair_measurement(
                     foreseen, np.arange(len(track)), measured,
-                    variances_by_angles(white, measured), None, part.weights,
+                    variances_of_azimuth_elevation_range(white, measured), None, part.weights,
                 )  # fmt: skip
             else:
                 variance = spread(track, cells, rows)
                 pairs = pair_measurement(
                     moments, track, measured, variance,
-                    common_errors(
+                    covariance_with_last_errors(
                         rules, part, track, scans, rows, cells, moments[0].expected, variance
                     ),
                     part.weights,
@@ -132,7 +139,7 @@ def gate_pairs(
             held[entry[gated]] = True
             if not gated.all():
                 settled = (part.status == CONFIRMED) | (part.status == COASTED)
-                near = pairs.distance <= gate_threshold(rules.widest_gate, kind.size)
+                near = pairs.distance <= gate_threshold(rules.widest_gate_probability, kind.size)
                 held[entry[near & settled[track]]] = True
             (inside,) = gated.nonzero()
             cells = cells[inside]
@@ -158,7 +165,7 @@ def _pairs_near(
     spread: "_PairVariance",
     few: int,
 ) -> tuple[IntArray, IntArray]:
-    """Return pairs of one look whose angles and range lie in a box about the gate.
+    """Return track and detection indices of a look's pairs in angle and range boxes at gates.
 
     Up to so `few` pairs are all returned.
     """
@@ -169,15 +176,15 @@ def _pairs_near(
     if so_far[-1] <= few:
         entry, track = _enumerate_pairs(many, first)
         return track, mine[entry]
-    threshold = gate_threshold(rules.widest_gate, kind.size)
+    threshold = gate_threshold(rules.widest_gate_probability, kind.size)
     cells = batch.detection[mine]
     measured = _values_at(batch.scans.measured, rows[:3], cells)
     variance = _values_at(batch.scans.variance, rows[:3], cells)
-    boxes = [_box(one, variance, threshold, spread.most) for one in moments]
+    boxes = [_expected_and_half_widths(one, variance, threshold, spread.most) for one in moments]
     tracks, entries = [], []
     # In clutter there are more pairs than fit into memory at once.
     part = so_far // _MOST_PAIRS
-    for begin, end in _parts(part):
+    for begin, end in _bounds_of_equal_runs(part):
         entry, track = _enumerate_pairs(many[begin:end], first[begin:end])
         entry += begin
         kept = [_pairs_in_gate_boxes(*box, measured, entry, track) for box in boxes]
@@ -190,7 +197,7 @@ def _pairs_near(
 
 
 def _enumerate_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
-    """Return the entry and the track of each pair: so many tracks an entry, from a first one."""
+    """Return all pairs' entry and track index, from each entry's number of tracks and the first."""
     entry = np.arange(len(many)).repeat(many)
     before = many.cumsum() - many
     return entry, np.arange(len(entry)) - (before - first).repeat(many)
@@ -221,10 +228,10 @@ class _PairVariance:
         return variance
 
 
-def _box(
+def _expected_and_half_widths(
     moments: Moments, variance: FloatArray, threshold: float, more: FloatArray | None
 ) -> tuple[FloatArray, FloatArray]:
-    """Return where one model expects angles and range, and half the widths of boxes about gates.
+    """Return each track's expected angles and range, and half widths of a box around its gate.
 
     They are wide enough for the worst detection of all, and for rounding.
     """
@@ -241,7 +248,7 @@ def _box(
 def _pairs_in_gate_boxes(
     expected: FloatArray, half: FloatArray, measured: FloatArray, entry: IntArray, track: IntArray
 ) -> IntArray:
-    """Return which pairs lie in the boxes about the gates of one model."""
+    """Return the pairs whose measured values lie in the box around one model's gate (indices)."""
     left: IntArray | None = None
     for i in range(len(expected)):
         apart = measured[i].take(entry)
@@ -260,22 +267,22 @@ def _pairs_in_gate_boxes(
 
 
 def _values_at(values: FloatArray, rows: list[int], cells: IntArray) -> FloatArray:
-    """Return some rows of values at some detections."""
+    """Return the given rows of an array at chosen detections, (rows, detections)."""
     result = np.empty((len(rows), len(cells)))
     for i, row in enumerate(rows):
         values[row].take(cells, out=result[i], mode="clip")
     return result
 
 
-def _parts(part: IntArray) -> list[tuple[int, int]]:
-    """Return where runs of equal numbers, ascending from 0, begin and end."""
+def _bounds_of_equal_runs(part: IntArray) -> list[tuple[int, int]]:
+    """Return the begin and end index of each run of equal numbers in an ascending array."""
     if len(part) == 0 or part[-1] == 0:
         return [(0, len(part))]
     cuts = [0, *(np.flatnonzero(np.diff(part)) + 1).tolist(), len(part)]
     return list(pairwise(cuts))
 
 
-def common_errors(
+def covariance_with_last_errors(
     rules: TrackerRules,
     part: TrackStore,
     track: IntArray,
@@ -285,7 +292,7 @@ def common_errors(
     foreseen: FloatArray,
     variance: FloatArray,
 ) -> FloatArray | None:
-    """Return what the errors of pairs' measurements have in common with their sensors' last ones.
+    """Return each pair's error covariance with the same sensor's last measurement of the track.
 
     None where all errors are new at every look.
     """
@@ -306,11 +313,11 @@ def common_errors(
     moved[0] = wrap_pi_unchecked(moved[0])
     moved = np.where(seen, np.abs(moved), 0.0)
     range_m = np.where(seen, part.seen[2, there, track], np.inf)
-    return rules.lasting.common(rows, there, variance, moved, since_s, range_m)
+    return rules.lasting.covariance_with_last_errors(rows, there, variance, moved, since_s, range_m)
 
 
-def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:
-    """Return the logarithm of the density of false alarms at every pair's detection."""
+def log_false_alarm_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> FloatArray:
+    """Return ln of the false alarm density at each pair's detection, by that one's first sensor."""
     mine = sensors[one.detection]
     lowest = mine & -mine
     sensor = np.frexp(lowest.astype(float))[1] - 1
@@ -318,10 +325,10 @@ def log_density(rules: TrackerRules, one: GatedPairs, sensors: IntArray) -> Floa
     return np.asarray(rules.log_density[code].take(sensor))
 
 
-def log_gain(
+def log_score_gain(
     rules: TrackerRules, part: TrackStore, one: GatedPairs, sensors: IntArray
 ) -> FloatArray:
-    """Return ln(Pd N(z) / λ) of every pair."""
-    density = log_density(rules, one, sensors)
+    """Return, for each pair, the gain of track score ln(Pd N(z) / λ) if its detection is taken."""
+    density = log_false_alarm_density(rules, one, sensors)
     mixed = log_mixture(select_tracks(part.weights, one.track), one.measured.log_likelihoods)
     return np.asarray(np.log(rules.p.detection_probability) + mixed - density)

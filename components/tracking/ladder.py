@@ -4,13 +4,13 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.batched import cholesky, distance_squared
+from components.estimation.batched import cholesky, mahalanobis_squared
 from components.estimation.frame import pose_in_frame
-from components.estimation.measurement import position_of
+from components.estimation.measurement import position_and_jacobian
 from components.messages.columns import ORIGIN, POSE, POSITION, VELOCITY
-from components.messages.false_detections import true_entries
+from components.messages.false_detections import without_false_alarms
 from components.messages.fused import FusedDetections
-from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks, full_covariance
+from components.messages.state_tracks import COASTED, CONFIRMED, StateTracks, covariance_matrices
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.ladder import Ladder, Quantity, Rung
@@ -21,7 +21,8 @@ _NEAR_M = 1000.0
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return how far the confirmed track of each detected target is from it.
+    """Return, at every row and target that was detected, the distance of the nearest confirmed
+    track (m) and its NEES, for a ladder of models.
 
     Rungs have other tracks, so they are compared with the truth and not with each other: at every
     instant at which a target was detected and tracks are reported, the nearest confirmed track with
@@ -34,7 +35,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     shape = (len(wake), len(fused.roster))
     errors = {name: np.full(shape, np.nan) for name in ("position", "nees")}
     tracks: Any = block.run(wake)
-    fused = true_entries(fused)
+    fused = without_false_alarms(fused)
     if tracks is None or len(fused.target) == 0:
         return errors
     row_of_track = np.repeat(np.searchsorted(wake.ticks, tracks.tick), np.diff(tracks.offsets))
@@ -58,8 +59,8 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     best = best[distance[best] <= _NEAR_M]
     row, target = row_of_entry[entry[best]], fused.target[entry[best]]
     errors["position"][row, target] = distance[best]
-    spread = full_covariance(tracks.covariance, mine[best], 3)
-    nees = distance_squared(cholesky(spread), error[:, best]) / 3.0
+    spread = covariance_matrices(tracks.covariance, mine[best], 3)
+    nees = mahalanobis_squared(cholesky(spread), error[:, best]) / 3.0
     # A covariance is not carried back: of late detections only the position counts.
     errors["nees"][row, target] = np.where(back_s[best] < 1e-6, nees, np.nan)
     return errors
@@ -68,7 +69,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
 def _track_errors(
     fused: FusedDetections, entry: IntArray, tracks: StateTracks, mine: IntArray, wake: Wake
 ) -> tuple[FloatArray, FloatArray]:
-    """Return tracks less the true positions of entries, (3, pairs), and how far they went back."""
+    """Return track minus true position (3, pairs), m, when measured, and the time moved back, s."""
     measured_s = fused.measured_tick[entry] / wake.ticks_per_s
     own = np.stack([fused.pose_columns()[name][entry] for name in POSE])
     origin = np.stack([getattr(tracks, name)[mine] for name in ORIGIN])
@@ -76,7 +77,7 @@ def _track_errors(
     true = np.stack(
         [fused.true_azimuth_rad[entry], fused.true_elevation_rad[entry], fused.true_range_m[entry]]
     )
-    truth_m, _ = position_of(true, pose)
+    truth_m, _ = position_and_jacobian(true, pose)
     back_s = tracks.state_s[mine] - measured_s
     position = np.stack([getattr(tracks, name)[mine] for name in POSITION])
     velocity = np.stack([getattr(tracks, name)[mine] for name in VELOCITY])
@@ -84,7 +85,9 @@ def _track_errors(
 
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the same for the reference: what its sensors measure is part of it."""
+    """Return position error and NEES at chosen (row, target) cells of the reference, in whose
+    sensors' measurements lies part of the error.
+    """
     row, target = cells.T
     return {name: values[row, target] for name, values in measure(block, wake, block).items()}
 

@@ -19,11 +19,16 @@ from components.estimation.batched import (
 from components.estimation.estimator import Estimates
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, update
-from components.estimation.measurement import Kind, expected_measurement, linearise, position_of
+from components.estimation.measurement import (
+    Kind,
+    expected_measurement,
+    linearise,
+    position_and_jacobian,
+)
 from components.messages.state_tracks import COASTED, CONFIRMED, DELETED, TENTATIVE
-from components.tracking.due_detections import misdetection_counts, range_of
+from components.tracking.due_detections import range_or_infinity_m, update_misdetection_counts
 from components.tracking.rules import LONGEST_WINDOW, TrackerRules
-from components.tracking.scans import TELLS, LookBatch, Scans, kind_of
+from components.tracking.scans import TELLS, LookBatch, Scans, kind_and_measured_rows
 from components.tracking.track_store import NEVER, TrackStore, estimate_columns
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -41,10 +46,10 @@ def judge_status(
     misses: IntArray,
     score: FloatArray,
 ) -> IntArray:
-    """Return the status of tracks after a look: confirmed, coasted, deleted, or as it was."""
+    """Return each track's new status after a look: confirmed, coasted, deleted or unchanged."""
     tentative, new = status == TENTATIVE, status
     if tentative.any():
-        confirm, hopeless = _confirm_tentative(rules, history, looks, score)
+        confirm, hopeless = _masks_confirmed_and_hopeless(rules, history, looks, score)
         new = np.where(tentative & confirm, CONFIRMED, status)
         new = np.where(tentative & ~confirm & hopeless, DELETED, new)
     held = (new == CONFIRMED) | (new == COASTED)
@@ -54,10 +59,10 @@ def judge_status(
     return np.where(held & (misses >= rules.p.delete_misses), DELETED, new)
 
 
-def _confirm_tentative(
+def _masks_confirmed_and_hopeless(
     rules: TrackerRules, history: IntArray, looks: IntArray, score: FloatArray
 ) -> tuple[BoolArray, BoolArray]:
-    """Return which tentative tracks are confirmed, and which can no longer be."""
+    """Return which tentative tracks are confirmed, and which can no longer be (two masks)."""
     p = rules.p
     if p.initiation == "m_of_n":
         hits = count_bits(history & (1 << p.confirm_n) - 1)
@@ -83,7 +88,7 @@ def count_bits(values: IntArray) -> IntArray:
 def update_history(
     history: IntArray, looks: IntArray, misses: IntArray, hit: BoolArray, missed: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return history, looks and misses after a look that hit or missed some of the tracks."""
+    """Return each track's hit history (bits), number of looks and misses in a row after a look."""
     counted = hit | missed
     moved = np.where(counted, (history << 1 & (1 << LONGEST_WINDOW) - 1) | hit, history)
     return moved, looks + counted, np.where(hit, 0, misses + missed)
@@ -92,10 +97,10 @@ def update_history(
 def initiate_tracks(
     rules: TrackerRules, batch: LookBatch, chosen: BoolArray, next_number: IntArray
 ) -> tuple[TrackStore, IntArray]:
-    """Return a track for each of the chosen detections, and the next number of each replica."""
+    """Return a new tentative track per chosen detection, and each replica's next number."""
     scans, looks, replica = batch.scans, batch.look, batch.replica
     detection, of, codes = batch.detection[chosen], batch.of[chosen], batch.code[chosen]
-    count, pose = len(detection), batch.pose(of)
+    count, pose = len(detection), batch.poses_of_looks(of)
     estimates = start_estimates(rules, scans, pose, codes, detection)
     ranged = codes % 2 == 1
     counts = np.bincount(of, minlength=len(looks))
@@ -110,7 +115,7 @@ def initiate_tracks(
         tick=tick,
         born_tick=tick,
         updated_tick=tick,
-        life_ticks=rules.life_ticks(by, range_m),
+        life_ticks=rules.track_life_ticks(by, range_m),
         updated_m2=0.0 * ones,
         history=whole,
         looks=whole,
@@ -126,13 +131,13 @@ def initiate_tracks(
         seen=np.full((3, len(rules.fields), count), np.nan),
         seen_tick=np.full((len(rules.fields), count), -1),
         counted_tick=np.broadcast_to(tick, by.shape),
-        own_m_s=_ownship_velocity_of_coarse(rules, scans, codes, detection),
+        own_m_s=_ownship_velocity_at_coarse_bearings(rules, scans, codes, detection),
         **estimate_columns(estimates),
     )
     status = judge_status(rules, born.status, born.history, born.looks, born.misses, born.score)
     born = born.with_columns(
         status=status,
-        updated_m2=position_variance(born),
+        updated_m2=position_variance_m2(born),
         **last_seen_columns(rules, born, pose, mask),
     )
     return born, next_number + counts
@@ -141,7 +146,7 @@ def initiate_tracks(
 def start_estimates(
     rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
 ) -> Estimates:
-    """Return initial estimates from one detection each, of several kinds `codes`."""
+    """Return initial states and covariances for all models, from one detection per track."""
     count = len(detection)
     measured, variance = (
         select_tracks(scans.measured[:3], detection),
@@ -153,11 +158,11 @@ def start_estimates(
     variance[2] = np.where(ranged, variance[2], deviation**2)
     # Nearer than its own error nothing has a direction; a false alarm may be reported at range 0.
     measured[2] = np.maximum(measured[2], np.sqrt(variance[2]))
-    position, jacobian = position_of(measured, pose)
+    position, jacobian = position_and_jacobian(measured, pose)
     steep = np.abs(measured[1]) > _STEEPEST_RAD
     if steep.any():  # straight up or down an azimuth moves nothing, and would seem to be known
         measured[1] = np.where(steep, np.copysign(_STEEPEST_RAD, measured[1]), measured[1])
-        jacobian = position_of(measured, pose)[1]
+        jacobian = position_and_jacobian(measured, pose)[1]
     spread = np.zeros((6, 6, count))
     spread[:3, :3] = multiply_by_transpose(product(jacobian, _diagonal(variance)), jacobian)
     spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
@@ -166,24 +171,26 @@ def start_estimates(
     if rules.p.start_climb_m_s is not None:
         spread[5, 5] = rules.p.start_climb_m_s**2
     states, covariances = [], []
-    begin = _start_by_reports(rules, scans, pose, codes, detection, position, spread)
-    known = 6 + rules.estimator.errors
+    begin = _initial_states_and_covariances(rules, scans, pose, codes, detection, position, spread)
+    known = 6 + rules.estimator.error_count
     sizes = [model.size for model in rules.estimator.models]
     for size in sizes:
         state, covariance = np.zeros((size, count)), np.zeros((size, size, count))
         state[:known], covariance[:known, :known] = begin
         for i in range(known, size):
-            covariance[i, i] = rules.start_deviation(size - rules.estimator.errors) ** 2
+            covariance[i, i] = (
+                rules.initial_extra_state_deviation(size - rules.estimator.error_count) ** 2
+            )
         _update_by_rates(scans, pose, codes, detection, state, covariance)
         states.append(state)
         covariances.append(covariance)
     return Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
 
 
-def _ownship_velocity_of_coarse(
+def _ownship_velocity_at_coarse_bearings(
     rules: TrackerRules, scans: Scans, codes: IntArray, detection: IntArray
 ) -> FloatArray:
-    """Return how the ownship moved at detections with coarse bearings, (3, n); else NaN."""
+    """Return the ownship's velocity (3, n), NED, at detections with coarse bearing; else NaN."""
     if rules.carried is None or scans.reported is None:
         return np.full((3, len(detection)), np.nan)
     return np.where(codes & TELLS > 0, rules.carried.ownship_velocity_m_s(scans, detection), np.nan)
@@ -198,7 +205,7 @@ def manage_tracks(
     hit: BoolArray,
     gain: FloatArray,
 ) -> TrackStore:
-    """Return tracks with their history, score and status after a look.
+    """Return the tracks with hit history, score, status and times updated after a look.
 
     `part` are they before and `changed` after the update by detections; `looked` (sensors, tracks)
     says whose looks were expected to see them, `gain` what a hit adds to the score.
@@ -206,14 +213,14 @@ def manage_tracks(
     missed = ~hit
     missed &= looked.any(axis=0)
     by = np.where(hit, changed.updated_by, 0)
-    misdetections = misdetection_counts(part.misdetections, by, looked)
+    misdetections = update_misdetection_counts(part.misdetections, by, looked)
     gain[~hit] = 0.0
     gain[missed] = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
     history, count, misses = update_history(part.history, part.looks, part.misses, hit, missed)
     score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
     status = judge_status(rules, part.status, history, count, misses, score)
     updated_tick = np.where(hit, changed.tick, changed.updated_tick)
-    spread_m2, life_ticks = position_variance(changed), part.life_ticks
+    spread_m2, life_ticks = position_variance_m2(changed), part.life_ticks
     updated_m2 = np.where(hit, spread_m2, part.updated_m2)
     ended = changed.ranged & (spread_m2 - updated_m2 > rules.p.delete_above_m**2)
     counted_tick = part.counted_tick
@@ -222,9 +229,11 @@ def manage_tracks(
         counted_tick = np.where(counts, np.maximum(counted_tick, changed.tick), counted_tick)
     if hit.any():
         # Who has not missed it, and has looked at it lately.
-        lately = changed.tick - counted_tick <= rules.lives_ticks
+        lately = changed.tick - counted_tick <= rules.default_life_ticks
         sees = (misdetections == 0) & (lately if rules.promises else True)
-        life_ticks = np.where(hit, rules.life_ticks(sees, range_of(changed, pose)), life_ticks)
+        life_ticks = np.where(
+            hit, rules.track_life_ticks(sees, range_or_infinity_m(changed, pose)), life_ticks
+        )
     ended |= changed.tick - updated_tick > life_ticks
     return changed.with_columns(
         history=history, looks=count, misses=misses, score=score, misdetections=misdetections,
@@ -234,13 +243,13 @@ def manage_tracks(
     )  # fmt: skip
 
 
-def position_variance(part: TrackStore, *, late: bool = False) -> FloatArray:
-    """Return the variance of each track's position, summed over its axes.
+def position_variance_m2(part: TrackStore, *, late: bool = False) -> FloatArray:
+    """Return each track's summed position variance, m²; ValueError if a covariance is singular.
 
     `late` says that the tracks were taken back to a late look, for what an error advises.
     """
     total = np.zeros(len(part))
-    for weight, spread in zip(part.weights, part.covariances(), strict=True):
+    for weight, spread in zip(part.weights, part.covariances_by_model(), strict=True):
         total = total + weight * (spread[0, 0] + spread[1, 1] + spread[2, 2])
     good = np.isfinite(total) & (total >= 0.0)
     if not bool(good.all()):
@@ -267,11 +276,11 @@ def _advise_on_late_looks(late: bool) -> str:
 def last_seen_columns(
     rules: TrackerRules, part: TrackStore, pose: SensorPose, mask: IntArray
 ) -> dict[str, Any]:
-    """Return the columns of where tracks were last seen, changed by the sensors of a mask.
+    """Return the columns of each track's last view by sensor, updated for sensors in a bit mask.
 
     Nothing is kept of sensors all of whose errors are new.
     """
-    if rules.lasting is None or not (mask := mask & rules.lasting.sensors).any():
+    if rules.lasting is None or not (mask := mask & rules.lasting.correlated_sensors_mask).any():
         return {}
     mine = (mask >> np.arange(len(part.misdetections))[:, np.newaxis] & 1).astype(bool)
     here = expected_measurement(Kind(True), part.state0, pose)
@@ -289,11 +298,11 @@ def _update_by_rates(
     state: FloatArray,
     covariance: FloatArray,
 ) -> None:
-    """Update new tracks by their measured range rates, in pose."""
+    """Update states and covariances of new tracks, in place, by their measured range rates."""
     which = np.flatnonzero(codes & 2)
     if len(which) == 0:
         return
-    kind, _ = kind_of(2)
+    kind, _ = kind_and_measured_rows(2)
     known, slope = linearise(kind, select_tracks(state, which), pose.take(which))
     cells = detection[which]
     rate, variance = (
@@ -306,7 +315,7 @@ def _update_by_rates(
     )
 
 
-def _start_by_reports(
+def _initial_states_and_covariances(
     rules: TrackerRules,
     scans: Scans,
     pose: SensorPose,
@@ -315,12 +324,12 @@ def _start_by_reports(
     position: FloatArray,
     spread: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return new tracks with the velocities that are reported, and with the errors that they carry.
+    """Return new tracks' states and covariances, with reported velocities and carried errors.
 
     `spread` (6, 6, n) is that of position and velocity where nothing is reported. A report is off
     by its errors, so that the target lies that far on the other side.
     """
-    errors, count = rules.estimator.errors, len(detection)
+    errors, count = rules.estimator.error_count, len(detection)
     state, covariance = np.zeros((6 + errors, count)), np.zeros((6 + errors, 6 + errors, count))
     state[:3], covariance[:6, :6] = position, spread
     moving = np.flatnonzero(codes & 4)
@@ -334,18 +343,18 @@ def _start_by_reports(
         return state, covariance
     cells = detection[telling]
     reported = rules.carried.errors_of_detections(scans, cells)
-    effects = reported.effects(state[:6, telling], pose.take(telling))
+    effects = reported.effects_on_reported_states(state[:6, telling], pose.take(telling))
     effects[3:] *= (codes[telling] & 4) > 0
-    white = rules.carried.white(scans, cells, [0, 1, 2, 4, 5, 6])
+    white = rules.carried.new_error_variances(scans, cells, [0, 1, 2, 4, 5, 6])
     own = covariance[:6, :6, telling]
     for i in (3, 4, 5):
         own[i, i] = np.where(codes[telling] & 4, white[i], own[i, i])
     own[:3, :3] = _diagonal(white[:3])
-    ages = rules.carried.ages(scans, cells, np.zeros(len(cells)))
+    ages = rules.carried.report_ages(scans, cells, np.zeros(len(cells)))
     own += multiply_by_transpose(effects, effects)
     speeds = np.stack([own[i, i] for i in (3, 4, 5)])
     for model in rules.estimator.models:
-        own += ages.errors(model, np.zeros((model.size, len(cells))), speeds)[0] / len(
+        own += ages.error_covariances(model, np.zeros((model.size, len(cells))), speeds)[0] / len(
             rules.estimator.models
         )
     covariance[:6, :6, telling] = symmetric(own)

@@ -26,12 +26,12 @@ from components.tracking.track_store import TrackStore
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
-from dsa_des.record.failure_counts import NO_COUNTS, count_cases
+from dsa_des.record.failure_counts import NO_COUNTS, add_cases
 from dsa_des.time.clock import ClockSpec
 
 
 class Snapshot(NamedTuple):
-    """The tracks of a replica before a look was worked on."""
+    """The tracks and next track number of a replica just before a look was processed."""
 
     store: TrackStore  # With this replica's tracks among others
     next_number: int
@@ -39,7 +39,7 @@ class Snapshot(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """The order in which looks are worked on, a row for each work."""
+    """Order in which looks are processed, as columns with a row for each step."""
 
     forgotten: list[list[int]]  # Looks that need not be remembered after each
     look: IntArray
@@ -52,19 +52,22 @@ class Plan:
     since: IntArray
 
     @property
-    def reports(self) -> BoolArray:
-        """Return whether tracks are reported after each step: the last one of a row."""
+    def is_reported_after(self) -> BoolArray:
+        """Mask over steps: True for a wake row's last step, after which tracks are reported."""
         return np.append(self.row[1:] != self.row[:-1], True)[: len(self.row)]
 
     @property
-    def begins(self) -> BoolArray:
-        """Return whether each step is the first of several that a row causes."""
-        return np.append(True, self.row[1:] != self.row[:-1])[: len(self.row)] & ~self.reports
+    def begins_several(self) -> BoolArray:
+        """Mask over steps: True where the step is the first of several in its row of the wake."""
+        return (
+            np.append(True, self.row[1:] != self.row[:-1])[: len(self.row)]
+            & ~self.is_reported_after
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Past:
-    """Looks that later ones may still come before, those of a run in the order they were made."""
+    """Looks kept, in order made, as an older one may yet arrive, with the tracks before each."""
 
     scans: Scans
     before: list[Snapshot]  # Of each look
@@ -73,7 +76,7 @@ class Past:
         return len(self.before)
 
     def split_runs(self, runs: IntArray, first_run: int) -> tuple["Past", "Past"]:
-        """Return the looks of some runs, and those of the others that go on."""
+        """Return the given runs' kept looks, and all other runs' from `first_run` on."""
         run = self.scans.run
         mine = np.isin(run, runs)
         parts = [np.flatnonzero(which) for which in (mine, ~mine & (run >= first_run))]
@@ -84,7 +87,7 @@ class Past:
     def from_looks(
         cls, scans: Scans, looks: list[int], before: Mapping[int, Snapshot], others: "Past | None"
     ) -> "Past":
-        """Return some looks, each with the tracks of its own run alone, and after them others."""
+        """Return the given looks, each with the tracks of its run before it, then `others`."""
         kept = []
         for look in looks:
             store, next_number = before[look]
@@ -95,10 +98,11 @@ class Past:
         return cls(Scans.concatenate([mine, others.scans]), kept + others.before)
 
 
-def plan_of_late(
+def plan_with_late_looks(
     scans: Scans, of: IntArray, begin: int, lag_ticks: int, *, rerun: bool
 ) -> tuple[Plan, list[int], list[int]]:
-    """Return the order of work, looks that come too late, and those that are remembered after it.
+    """Return the plan of steps with late looks in it, the looks that are too late and left out, and
+    the looks to keep afterwards.
 
     Looks before `begin` are those remembered; `of` is the index of each one's replica. With `rerun`
     late looks have all since them worked on again, else they are worked on in one step.
@@ -141,9 +145,11 @@ def plan_of_late(
     return Plan(forgotten, *columns), left_out, kept
 
 
-def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
-    """Return the order of work where late looks are left out."""
-    so_far = RunTicks(of, scans.tick).newest().tick
+def plan_without_late_looks(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
+    """Return the plan of steps in order of arrival, and the looks left out because a newer one of
+    their replica came first.
+    """
+    so_far = RunTicks(of, scans.tick).running_latest().tick
     keep = (scans.tick >= so_far) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)
     none = np.full(len(look), -1)
@@ -154,7 +160,7 @@ def straight_plan(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, l
 def tracks_before(
     before: Mapping[int, Snapshot], looks: list[int], replicas: list[int]
 ) -> TrackStore:
-    """Return how tracks of some replicas (ascending) were, each before a look of its own."""
+    """Return the tracks of some replicas (ascending) as they were before one given look of each."""
     by_store: dict[int, tuple[TrackStore, list[int]]] = {}
     for look, replica in zip(looks, replicas, strict=True):
         store = before[look].store
@@ -168,7 +174,7 @@ _MOST_LOOKS = 2000
 
 
 def may_come_late(offers: Mapping[str, Any], producers: Iterable[Producer]) -> bool:
-    """Return whether a look may come after one that was made later."""
+    """Return whether a look may arrive after a look that was made later."""
     return (
         not offers
         or any(one.jitter_s > 0 or one.unforeseen for one in producers)
@@ -179,8 +185,8 @@ def may_come_late(offers: Mapping[str, Any], producers: Iterable[Producer]) -> b
     )
 
 
-def latest_s(offers: Mapping[str, Any], producers: Iterable[Producer]) -> Fraction:
-    """Return how late a look may come at most, as far as the scene says; queues are not in it."""
+def max_lateness_s(offers: Mapping[str, Any], producers: Iterable[Producer]) -> Fraction:
+    """Return a look's largest delay, s, by the scene's latencies and jitter, without queues."""
     late_s = [o.latest_s or 0 for o in offers.values() if isinstance(o, SensorOffer)]
     return Fraction(max(late_s, default=0) + max((one.latest_s for one in producers), default=0))
 
@@ -188,7 +194,7 @@ def latest_s(offers: Mapping[str, Any], producers: Iterable[Producer]) -> Fracti
 def late_look_shares(
     offers: Mapping[str, Any], lag_s: Fraction, duration_s: Fraction
 ) -> dict[str, float]:
-    """Return the share of each sensor's looks that come when a look newer by a lag is known."""
+    """Return, by sensor, the share of looks that a look newer by more than `lag_s` may overtake."""
     said = {
         name: (o.clock(), o.latest_s, o.jitter_s)
         for name, o in sorted(offers.items())
@@ -223,14 +229,14 @@ def _instant(clock: ClockSpec, scan: int) -> Fraction:
     return clock.offset_s + scan * clock.period_s
 
 
-def warning(name: str, share: float, why: str) -> str:
-    """Return a sentence about looks that will be left out."""
+def late_looks_warning(name: str, share: float, why: str) -> str:
+    """Return a sentence: up to this share of a sensor's looks are too late and left out."""
     return f"{why}: up to {share:.0%} of the looks of {name} come too late and are left out"
 
 
 @dataclass(frozen=True, eq=False)
 class LookCount:
-    """Counts of each sensor's looks, and of those that came too late."""
+    """Numbers of each sensor's looks per run, and of those left out because they came too late."""
 
     #: By name of the sensor: of each run those left out, and all (2, runs).
     counts: Mapping[str, IntArray] = field(default_factory=dict)
@@ -238,14 +244,14 @@ class LookCount:
     def add_looks(
         self, sensors: tuple[str, ...], looks: Scans, came: slice, left_out: IntArray | list[int]
     ) -> "LookCount":
-        """Return the count with more looks added: those that came, and those left out."""
+        """Return new counts with looks that arrived and looks that were left out added."""
 
         def runs_of(some: slice | IntArray | list[int], sensor: int) -> IntArray:
             return looks.run[some][(looks.sensors[some] >> sensor & 1).astype(bool)]
 
         return LookCount(
             {
-                name: count_cases(
+                name: add_cases(
                     self.counts.get(name, NO_COUNTS), runs_of(left_out, i), runs_of(came, i)
                 )
                 for i, name in enumerate(sensors)
@@ -253,14 +259,14 @@ class LookCount:
         )
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how many looks of each sensor came too late, of how many, by run."""
+        """Return, by sensor, the number of looks per run that came too late, and of all looks."""
         return {
             f"a look of {name} comes too late and is left out": counts
             for name, counts in sorted(self.counts.items())
         }
 
-    def late(self) -> dict[str, dict[str, float]]:
-        """Return looks, those left out and their share, by sensor; of those that lost any."""
+    def late_look_statistics(self) -> dict[str, dict[str, float]]:
+        """Return, by sensor that lost looks, its looks, how many were left out, their share."""
         both = {name: of.sum(axis=1).tolist() for name, of in sorted(self.counts.items())}
         return {
             name: {"looks": looks, "left_out": lost, "share": lost / looks}

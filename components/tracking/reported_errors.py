@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from components.estimation.batched import times
+from components.estimation.batched import matrix_times_vector
 from components.estimation.carried_errors import BEARING, LATENCY, RANGE, Ages, ReportedErrors
 from components.estimation.frame import SensorPose
 from components.geometry import unit_vector_unchecked
@@ -27,8 +27,10 @@ _LEAST_COS = 1e-3
 _COARSEST_DEG = 5.0
 
 
-def errors_by_sensors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
-    """Return the errors that sensors tell of, and whose they are: once for those of an aircraft."""
+def sensors_by_told_error(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
+    """Return, for each error that sensors state, the names of the sensors that have it; an error of
+    the aircraft itself is listed once.
+    """
     result: dict[tuple[ToldError, str], list[str]] = {}
     for name, offer in sorted(offers.items()):
         for one in offer.told_errors if isinstance(offer, SensorOffer) else ():
@@ -36,8 +38,8 @@ def errors_by_sensors(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], 
     return result
 
 
-def unknown_latency(offers: Mapping[str, Any]) -> list[str]:
-    """Return what a tracker that carries no errors does not know of positions that are late."""
+def latency_warnings(offers: Mapping[str, Any]) -> list[str]:
+    """Return a warning for each sensor with position latency that this tracker does not model."""
     return [
         f"{name} may hear aircraft that send positions late and do not carry them on (their "
         "ads_b.latency_s is above compensated_s), an error of all reports alike along the flight "
@@ -47,8 +49,8 @@ def unknown_latency(offers: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def folded_ranges(offers: Mapping[str, Any]) -> list[str]:
-    """Return whose ranges fold, which a tracker takes for true."""
+def folded_range_warnings(offers: Mapping[str, Any]) -> list[str]:
+    """Return a warning for each sensor whose ranges fold within its reach but are taken as true."""
     return [
         f"ranges of {name} fold at {offer.ambiguous_m / 1000.0:.4g} km, and are taken for true: a "
         "target beyond is tracked where it seems to be; other_prfs_hz would resolve it"
@@ -58,8 +60,10 @@ def folded_ranges(offers: Mapping[str, Any]) -> list[str]:
     ]
 
 
-def coarse_bearings(offers: Mapping[str, Any]) -> list[str]:
-    """Return whose bearings are so coarse beside their ranges that targets lie on arcs."""
+def coarse_bearing_warnings(offers: Mapping[str, Any]) -> list[str]:
+    """Return a warning for each sensor whose azimuth errors are so large beside its precise ranges
+    that tracks become overconfident.
+    """
     return [
         f"azimuths of {name} have an error of {math.degrees(math.sqrt(variance)):.3g}°: beside a "
         "precise range they leave a target on an arc, which no Gaussian along straight axes is, "
@@ -73,7 +77,7 @@ def coarse_bearings(offers: Mapping[str, Any]) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class CarriedErrors:
-    """The errors that tracks carry."""
+    """Sensor errors that a track's state estimates along with position and velocity."""
 
     ways: tuple[int, ...]
     column: IntArray  # (errors,), of each error's deviation in `Scans.told`
@@ -82,8 +86,8 @@ class CarriedErrors:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "CarriedErrors":
-        """Return the carried errors that some sensors declare."""
-        errors = errors_by_sensors(offers)
+        """Return the errors to estimate that the named sensors state in their offers."""
+        errors = sensors_by_told_error(offers)
         mine = np.array([[name in whose for name in sensors] for whose in errors.values()])
         ranging = np.array([one.way in (BEARING, RANGE) for one, _ in errors])
         return cls(
@@ -93,7 +97,7 @@ class CarriedErrors:
         )  # fmt: skip
 
     def errors_of_detections(self, scans: Scans, cells: IntArray) -> ReportedErrors:
-        """Return the errors that some detections report."""
+        """Return the carried errors' deviations and ages, as reported with chosen detections."""
         assert scans.reported is not None
         source, reported = scans.source[0][cells], scans.reported[:, cells]
         deviation = np.where(self.mine[:, source], reported[self.column], 0.0)
@@ -102,26 +106,32 @@ class CarriedErrors:
         )
 
     def ownship_velocity_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
-        """Return the ownship's velocity (north, east, down) where a bearing is coarse, else NaN."""
+        """Return the ownship's velocity (3, n), north, east, down, as reported with chosen
+        detections; NaN unless the bearing is coarse.
+        """
         assert scans.reported is not None
         return scans.reported[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
 
-    def white(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
-        """Return variances of what is new in detections, of a position along all axes alike."""
+    def new_error_variances(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
+        """Return detections' variances of new errors; for a position equal on all axes, m²."""
         assert scans.reported is not None
         variance = scans.variance[rows][:, cells]
         variance[:3] = scans.reported[TOLD.index("white_variance"), cells]
         return np.asarray(variance)
 
-    def ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
-        """Return how old the reports in detections are, for tracks last updated so long ago."""
+    def report_ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
+        """Return position and velocity ages in detections, beside time since track updates."""
         assert scans.reported is not None
         position, velocity, late = (scans.reported[TOLD.index(name), cells] for name in _AGES)
         return Ages(position, velocity, since_s, late)
 
 
-def variances_by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatArray:
-    """Return variances along three axes, m², as those of azimuth, elevation and range."""
+def variances_of_azimuth_elevation_range(
+    variance_m2: FloatArray, measured: FloatArray
+) -> FloatArray:
+    """Return variances across, up and along the line of sight (m²) converted to azimuth (rad²),
+    elevation (rad²) and range (m²).
+    """
     result, distance = variance_m2.copy(), np.maximum(measured[2], 1.0)
     level = np.maximum(np.cos(measured[1]), _LEAST_COS)
     result[0] /= (distance * level) ** 2
@@ -129,13 +139,13 @@ def variances_by_angles(variance_m2: FloatArray, measured: FloatArray) -> FloatA
     return result
 
 
-def level_angles(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, SensorPose]:
-    """Return azimuths and elevations (2, n) in body axes as ones in the frame's, and that pose.
+def angles_in_level_axes(angles_rad: FloatArray, pose: SensorPose) -> tuple[FloatArray, SensorPose]:
+    """Return azimuths and elevations (2, n) turned from body to level axes, and the level pose.
 
     Bearings and heights are reported in level axes: there it is linear.
     """
     body = np.stack(unit_vector_unchecked(*angles_rad))
-    x, y, z = times(pose.to_body.swapaxes(0, 1), body)
+    x, y, z = matrix_times_vector(pose.to_body.swapaxes(0, 1), body)
     upright = np.zeros_like(pose.to_body)
     for i in range(3):
         upright[i, i] = 1.0

@@ -41,7 +41,7 @@ class LastingErrors:
 
     @classmethod
     def of(cls, offers: Mapping[str, Any], sensors: tuple[str, ...]) -> "LastingErrors | None":
-        """Return lasting errors of sensors, or None where all errors are new at every look."""
+        """Return the correlated errors that named sensors state; None if new at every look."""
         known = {
             (_QUANTITIES.index(quantity), j): one
             for j, name in enumerate(sensors)
@@ -63,24 +63,26 @@ class LastingErrors:
 
     @cached_property
     def is_correlated(self) -> BoolArray:
-        """Return whether any error of each sensor is correlated; False for no sensor (-1)."""
+        """Mask over sensors: True where any error stays correlated from look to look; one more
+        False at the end stands for no sensor.
+        """
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
 
     @cached_property
-    def sensors(self) -> int:
-        """Mask of the sensors any of whose errors is correlated."""
+    def correlated_sensors_mask(self) -> int:
+        """Bit mask, as one integer, of the sensors that have a correlated error."""
         return sum(1 << i for i in np.flatnonzero(self.is_correlated).tolist())
 
     @cached_property
-    def _is_across_angles(self) -> bool:
+    def _has_crosswise_parts(self) -> bool:
         return bool(self.across_m2.any())
 
     @cached_property
-    def _is_shared(self) -> bool:
+    def _has_share_parts(self) -> bool:
         return bool(self.share.any())
 
-    def common(
+    def covariance_with_last_errors(
         self,
         rows: list[int],
         source: IntArray,
@@ -89,16 +91,16 @@ class LastingErrors:
         since_s: FloatArray,
         range_m: FloatArray,
     ) -> FloatArray:
-        """Return the covariance of measurements' errors with those of their sensors' last ones."""
+        """Return each measurement error's covariance with its sensor's last on that track."""
         at = _OF_ROW[rows][:, np.newaxis] * self.step.shape[1] + source
         step, seen = self.step.take(at), np.isfinite(since_s)
         rounding = step * step / 12.0
         white, remembered = variance - rounding, 0.0
         if len(self.variance):
             lasting = _take_cells(self.variance, at)
-            if self._is_across_angles:
+            if self._has_crosswise_parts:
                 lasting = lasting + _take_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
-            if self._is_shared:
+            if self._has_share_parts:
                 share = _take_cells(self.share, at)
                 stated = np.maximum(lasting + share * variance, 0.0)
                 lasting = np.where(share > 0.0, stated, lasting)
@@ -268,7 +270,7 @@ class TrackerParameters(Parameters):
 
 @dataclass(frozen=True, eq=False)
 class TrackerRules:
-    """Rules of a tracker: its parameters, its filter, and what the sensors offer."""
+    """Everything a tracker decides by: its parameters, filter, and sensors' offers."""
 
     p: Any  # TrackerParameters, or those of a subclass
     estimator: Estimator
@@ -292,7 +294,7 @@ class TrackerRules:
         sensors: tuple[str, ...],
         ticks_per_s: int,
     ) -> "TrackerRules":
-        """Return the rules for some sensors, given what they offer by name."""
+        """Return the rules of a tracker for the named sensors, given their offers by name."""
         known = [offers.get(name) for name in sensors]
         fields = tuple(o.reach if isinstance(o, SensorOffer) else None for o in known)
         farthest = max(
@@ -303,43 +305,46 @@ class TrackerRules:
         unstated = [o.unstated_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in known]
         used = [not range_rate_refusal(p, offer) for offer in known]
         return cls(
-            p, estimator, ticks_per_s, fields, log_densities(fields, p.false_alarms_per_scan),
+            p, estimator, ticks_per_s, fields, log_false_alarm_densities(fields,
+            p.false_alarms_per_scan),
             (assumed, 0.5 * assumed), sum(1 << i for i, one in enumerate(used) if one),
             LastingErrors.of(offers, sensors), np.array(unstated) if any(unstated) else None,
-            CarriedErrors.of(offers, sensors) if estimator.errors else None,
+            CarriedErrors.of(offers, sensors) if estimator.error_count else None,
             Promises.of(offers, sensors, ticks_per_s),
         )  # fmt: skip
 
     @property
     def start_score(self) -> float:
-        """Logarithm of the odds that a first detection is of a target."""
+        """Initial score of a track: log odds that a first detection is of a target."""
         return math.log(self.p.start_existence / (1.0 - self.p.start_existence))
 
     @property
-    def widest_gate(self) -> float:
-        """Probability of the gate outside of which a track has no say."""
+    def widest_gate_probability(self) -> float:
+        """The widest gate's probability: detections outside are never compared with tracks."""
         return max(self.p.gate_probability, self.p.start_gate_probability)
 
     @property
-    def lives_ticks(self) -> int:
-        """Return how long a track lives without detections if its sensors report every look."""
+    def default_life_ticks(self) -> int:
+        """Ticks that a track lives without detections if its sensors report at every look."""
         return int(LIVES_S * self.ticks_per_s)
 
-    def life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
-        """Return how long tracks live without a detection; `sees` (sensors, n) is who sees them."""
+    def track_life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
+        """Return the ticks each track lives undetected; `sees` (sensors, n) is True where seen."""
         if self.p.delete_after_s is not None:
             return np.full(len(range_m), int(self.p.delete_after_s * self.ticks_per_s))
-        return self.promises.life_ticks(sees, range_m)
+        return self.promises.track_life_ticks(sees, range_m)
 
-    def start_deviation(self, size: int) -> float:
-        """Standard deviation, in a new track, of what a model has besides position and velocity."""
+    def initial_extra_state_deviation(self, size: int) -> float:
+        """Return the initial standard deviation of the extra state of a model: turn rate (rad/s) if
+        it has 7 states, else acceleration (m/s²).
+        """
         if size == 7:
             return math.radians(getattr(self.p, "start_turn_deg_s", 3.0))
         return float(getattr(self.p, "start_acceleration_m_s2", 3.0))
 
 
 def range_rate_refusal(p: TrackerParameters, offer: Any) -> str:
-    """Return why range rates of a sensor with this offer are not used; empty where they are."""
+    """Return why this sensor's range rates are not used; an empty string if they are."""
     if not p.use_range_rate:
         return "use_range_rate is false"
     if not isinstance(offer, SensorOffer) or not offer.measures_range_rate:
@@ -351,8 +356,8 @@ def range_rate_refusal(p: TrackerParameters, offer: Any) -> str:
     return ""
 
 
-def log_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
-    """Return the logarithm of false alarms per unit of measured volume, (8 kinds, sensors)."""
+def log_false_alarm_densities(fields: tuple[Reach | None, ...], per_scan: float) -> FloatArray:
+    """Return ln of expected false alarms per unit of measured volume, (8 measurements, sensors)."""
     density = np.empty((8, len(fields)))
     for i, field in enumerate(fields):
         width, height, far = 2.0 * math.pi, math.pi, _FARTHEST_M

@@ -12,8 +12,8 @@ from components.estimation.frame import SensorPose, vectors_in_frame
 from components.estimation.measurement import Kind
 from components.messages.columns import POSE, TOLD
 from components.messages.fused import FusedDetections
-from dsa_des.arrays.entries import row_of_entries
-from dsa_des.arrays.run_ticks import RunTicks, next_position_in_run
+from dsa_des.arrays.entries import rows_of_entries
+from dsa_des.arrays.run_ticks import RunTicks, first_position_at_or_after
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
@@ -29,7 +29,7 @@ TELLS = 8
 
 @dataclass(frozen=True, eq=False)
 class Scans:
-    """Looks in the order of their arrival, and their detections."""
+    """Looks of sensors in order of arrival, with the detections of each."""
 
     row: IntArray  # (looks,), at which row of the wake each arrived, ascending
     run: IntArray  # (looks,), of the scene
@@ -54,8 +54,8 @@ class Scans:
     def __len__(self) -> int:
         return len(self.row)
 
-    def kinds(self, rates_of: int, carries: bool) -> IntArray:
-        """Return the kind of each detection.
+    def detection_kinds(self, rates_of: int, carries: bool) -> IntArray:
+        """Return the kind of each detection as an integer code.
 
         It is 1 with a range, 2 more with a range rate, 4 with a velocity, and `TELLS` with errors
         that the filter carries. One that carries none does without a velocity whose errors last:
@@ -78,17 +78,17 @@ class Scans:
         return code + 4 * (moves & (tells | ~errs)) + TELLS * tells
 
     def rotate_to_frame(self, origin_deg_m: FloatArray) -> Self:
-        """Return the looks with targets' velocities along the axes of frames with some origins."""
+        """Return looks with target velocities turned to the axes of frames at given origins."""
         if np.isnan(self.measured[4:]).all():
             return self
-        look = row_of_entries(self.offsets)
+        look = rows_of_entries(self.offsets)
         measured = self.measured.copy()
         places = select_tracks(self.pose[:3], look)
         measured[4:] = vectors_in_frame(select_tracks(origin_deg_m, look), places, measured[4:])
         return replace(self, measured=measured)
 
     def take(self, looks: IntArray) -> Self:
-        """Return some looks with their detections."""
+        """Return the looks with these indices, with their detections."""
         counts = np.diff(self.offsets)[looks]
         offsets = np.concatenate(([0], np.cumsum(counts)))
         which = np.repeat(self.offsets[looks] - offsets[:-1], counts) + np.arange(offsets[-1])
@@ -103,7 +103,7 @@ class Scans:
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
-        """Return the looks of all parts, one after the other."""
+        """Return the looks of all parts joined, one part after the other."""
         if len(parts) == 1:
             return parts[0]
         counts = np.concatenate([np.diff(part.offsets) for part in parts])
@@ -119,7 +119,7 @@ class Scans:
 
 @dataclass(frozen=True, eq=False)
 class LookBatch:
-    """One look of each of some replicas, with its detections."""
+    """At most one look per replica, to be processed together, with their detections."""
 
     scans: Scans
     look: IntArray  # (looks,), index into `scans`
@@ -133,7 +133,7 @@ class LookBatch:
     def from_looks(
         cls, scans: Scans, look: IntArray, replica: IntArray, codes: IntArray, poses: SensorPose
     ) -> Self:
-        """Return some looks, given the kinds of all detections and the poses of all looks."""
+        """Return a batch of the looks, at most one per replica, with their detections."""
         first = scans.offsets[look]
         counts = scans.offsets[look + 1] - first
         of = np.arange(len(look)).repeat(counts)
@@ -142,29 +142,29 @@ class LookBatch:
 
     @property
     def tick(self) -> IntArray:
-        """When each look was made."""
+        """Tick at which each look was made."""
         return self.scans.tick[self.look]
 
     @property
     def contributors(self) -> IntArray:
-        """Mask of the sensors of each detection."""
+        """Bit mask, per detection, of the sensors that contributed to it."""
         return self.scans.contributors[self.detection]
 
-    def pose(self, of: IntArray) -> SensorPose:
-        """Return the poses of some of its looks."""
+    def poses_of_looks(self, of: IntArray) -> SensorPose:
+        """Return the sensor poses of the looks with these indices in the batch."""
         return self.poses.take(self.look[of])
 
 
 @cache
-def kind_of(code: int) -> tuple[Kind, list[int]]:
-    """Return a kind by its number (`Scans.kinds`), and which rows of `Scans.measured` it has."""
+def kind_and_measured_rows(code: int) -> tuple[Kind, list[int]]:
+    """Return the kind of an integer code, and which rows of `Scans.measured` it uses."""
     kind = Kind(bool(code & 1), bool(code & 2), bool(code & 4))
     rows = [*([2] if kind.has_range else []), *([3] if kind.has_range_rate else [])]
     return kind, [0, 1, *rows, *([4, 5, 6] if kind.has_velocity else [])]
 
 
-def scans_of(fused: FusedDetections) -> Scans:
-    """Return the looks behind a message, and their detections, by arrival and then by instant.
+def looks_of_message(fused: FusedDetections) -> Scans:
+    """Return the looks in a fused message, with detections, ordered by arrival, then instant.
 
     A fusion that passes reports on states every look, also those in vain. Of other fusions a look
     is what was measured at one instant with the angles of one sensor, among the measurements of a
@@ -220,7 +220,7 @@ def scans_of(fused: FusedDetections) -> Scans:
     measured = np.array([*(getattr(fused, name) for name in _MEASURED), *reported[:3]])
     variance = np.array([*(getattr(fused, name) for name in _VARIANCES), *reported[3:6]])
     seen_from = select_tracks(poses, begins)
-    _refuse(fused, measured, variance, seen_from)
+    _check_poses_and_variances(fused, measured, variance, seen_from)
     return Scans(
         row=key[0][begins],
         run=fused.run[key[0][begins]],
@@ -239,7 +239,7 @@ def scans_of(fused: FusedDetections) -> Scans:
 
 
 def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArray:
-    """Return the ownship's velocity at each look, as the first of its entries has it."""
+    """Return the ownship's velocity (3, looks), from a look's first detection with one, or NaN."""
     velocity = np.full((3, count), np.nan)
     if fused.own_velocity is not None:
         velocities = np.array(list(fused.own_velocity.values()))
@@ -251,7 +251,7 @@ def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArra
 def split_due_looks(
     scans: Scans, ahead: Scans | None, wake: Wake, wait_ticks: int = 0
 ) -> tuple[Scans, Scans | None]:
-    """Return the looks that are due by the rows of a wake, in order, and those that wait.
+    """Return the looks to process by the wake's rows, in order, and those to keep (or None).
 
     A sweeping radar reports a scan as it begins, with instants at which its beam meets the targets
     later: such a look waits for the first row at or after its own instant.
@@ -261,7 +261,7 @@ def split_due_looks(
     if ahead is not None:
         scans = Scans.concatenate([replace(ahead, row=np.full(len(ahead), -1)), scans])
     due = RunTicks(scans.run, scans.tick + wait_ticks)
-    row = np.maximum(scans.row, next_position_in_run(wake.instants, due))
+    row = np.maximum(scans.row, first_position_at_or_after(wake.instants, due))
     there = np.minimum(row, len(wake) - 1)
     ready = (row < len(wake)) & (wake.run[there] == scans.run)
     waiting = ~ready & (scans.run >= wake.first_run)
@@ -270,7 +270,7 @@ def split_due_looks(
     return done, scans.take(np.flatnonzero(waiting)) if waiting.any() else None
 
 
-def _refuse(
+def _check_poses_and_variances(
     fused: FusedDetections, measured: FloatArray, variance: FloatArray, pose: FloatArray
 ) -> None:
     if np.isnan(pose).any():

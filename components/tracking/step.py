@@ -9,14 +9,14 @@ import numpy as np
 from components.estimation.estimator import LEAST, Estimates
 from components.estimation.out_of_sequence import (
     Retrodiction,
-    retrodiction,
-    retrodiction_by_motion,
+    retrodict_before_start,
+    retrodict_between,
 )
 from components.messages.state_tracks import DELETED
 from components.tracking.association import Association, Candidates
-from components.tracking.due_detections import expected_looks
+from components.tracking.due_detections import is_detection_expected
 from components.tracking.gating import gate_pairs
-from components.tracking.management import initiate_tracks, manage_tracks, position_variance
+from components.tracking.management import initiate_tracks, manage_tracks, position_variance_m2
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import LookBatch
 from components.tracking.track_store import TrackStore
@@ -30,7 +30,7 @@ def step(
     batch: LookBatch,
     next_number: IntArray,
 ) -> tuple[TrackStore, IntArray]:
-    """Return the tracks after one look of some replicas, and the next number of each of these.
+    """Return some replicas' tracks after one look of each, and their next track numbers.
 
     Tracks of replicas that do not look stay as they are.
     """
@@ -56,7 +56,7 @@ def step(
 
 
 def predict_tracks(rules: TrackerRules, part: TrackStore, tick: IntArray) -> TrackStore:
-    """Return tracks at instants (tracks,) that are not before their own."""
+    """Return the tracks predicted to given instants (ticks), none earlier than the track's own."""
     if len(part) == 0:
         return part
     dt_s = (tick - part.tick) / rules.ticks_per_s
@@ -74,10 +74,12 @@ def associate_looks(
     of: IntArray,
     batch: LookBatch,
 ) -> tuple[TrackStore, BoolArray]:
-    """Return predicted tracks after the looks `of` them, and which detections start no track."""
-    pose = batch.pose(of)
+    """Return the tracks updated by one look each, and a mask of the detections that are in some
+    gate and so start no new track.
+    """
+    pose = batch.poses_of_looks(of)
     kinds, direction, held = gate_pairs(rules, part, of, pose, batch)
-    looked = expected_looks(rules.fields, rules.promises, part, of, batch, pose, direction)
+    looked = is_detection_expected(rules.fields, rules.promises, part, of, batch, pose, direction)
     pairs = Candidates(rules, part, kinds, batch, pose)
     changed, hit, gain = association.update(pairs)
     return manage_tracks(rules, part, changed, pose, looked, hit, gain), held
@@ -93,7 +95,8 @@ def late_step(
     *,
     unless_updated: bool,
 ) -> tuple[TrackStore, IntArray, BoolArray]:
-    """Return the tracks after one late look of some replicas, next numbers, and looks left out.
+    """Return the tracks after one late look of each of some replicas, their next track numbers, and
+    a mask of the looks left out.
 
     A look is late for the tracks that speak of a later instant. Those that were there before it,
     as in `before`, are taken back to it by what they were then, those that are newer by what they
@@ -119,7 +122,7 @@ def late_step(
         ]
         back = [(one, *_retrodict(rules, now.take(one), old, tick[of][one])) for one, old in groups]
         for _, was, _, _ in back:
-            position_variance(was, late=True)
+            position_variance_m2(was, late=True)
         then = [
             predict_tracks(rules, now.take(~ahead), tick[of][~ahead]),
             *(one[1] for one in back),
@@ -133,7 +136,7 @@ def late_step(
             newer = now.updated_tick > tick[of]
             left_out[of[newer & (seen.updated_tick == tick[of])]] = True
             whole = _sort_tracks([whole.take(~newer), now.take(newer)])
-        position_variance(whole, late=True)
+        position_variance_m2(whole, late=True)
         parts.append(whole)
     if not held.all():
         new, next_number = initiate_tracks(rules, batch, ~held, next_number)
@@ -148,12 +151,10 @@ def _sort_tracks(parts: list[TrackStore]) -> TrackStore:
 def _match_earlier_tracks(
     before: TrackStore, now: TrackStore, tick: IntArray
 ) -> tuple[IntArray, BoolArray]:
-    """Return each track's index among the earlier tracks, and which have a state no later than
-    `tick`.
-    """
+    """Return each track's index in the earlier table, and a mask of states at or before `tick`."""
     if len(before) == 0:
         return np.zeros(len(now), dtype=np.int64), np.zeros(len(now), dtype=bool)
-    keys, key = before.key, now.key
+    keys, key = before.unique_numbers, now.unique_numbers
     index = np.minimum(np.searchsorted(keys, key), len(keys) - 1)
     there = (keys[index] == key) & (before.status[index] != DELETED)
     return index, there & (before.tick[index] <= tick)
@@ -166,15 +167,19 @@ def _retrodict(
     probabilities.
     """
     since_s = (now.tick - tick) / rules.ticks_per_s
-    present = zip(rules.estimator.models, now.states(), now.covariances(), strict=True)
+    present = zip(
+        rules.estimator.models, now.states_by_model(), now.covariances_by_model(), strict=True
+    )
     if old is None:
         until_s, chances = np.zeros(len(now)), now.weights
-        parts = [retrodiction_by_motion(model, (x, p), since_s) for model, x, p in present]
+        parts = [retrodict_before_start(model, (x, p), since_s) for model, x, p in present]
     else:
         until_s, chances = (tick - old.tick) / rules.ticks_per_s, old.weights
         parts = [
-            retrodiction(model, (y, q), (x, p), until_s, since_s)
-            for (model, x, p), y, q in zip(present, old.states(), old.covariances(), strict=True)
+            retrodict_between(model, (y, q), (x, p), until_s, since_s)
+            for (model, x, p), y, q in zip(
+                present, old.states_by_model(), old.covariances_by_model(), strict=True
+            )
         ]
     back = rules.estimator.past_model_probabilities(chances, until_s, since_s)
     weights = (back * now.weights[np.newaxis]).sum(axis=1)
@@ -185,11 +190,16 @@ def _retrodict(
 def _carry_forward(
     now: TrackStore, then: TrackStore, seen: TrackStore, parts: list[Retrodiction], back: FloatArray
 ) -> TrackStore:
-    """Return the tracks as they are now, after a look changed what they were then."""
+    """Return the tracks at present, corrected by what a late look changed at the past instant."""
     moved = [
         one.carry_forward(x, p, seen_x, seen_p)
         for one, x, p, seen_x, seen_p in zip(
-            parts, now.states(), now.covariances(), seen.states(), seen.covariances(), strict=True
+            parts,
+            now.states_by_model(),
+            now.covariances_by_model(),
+            seen.states_by_model(),
+            seen.covariances_by_model(),
+            strict=True,
         )
     ]
     weights = _weights_now(back, then.weights, seen.weights, now.weights)
@@ -203,7 +213,7 @@ def _carry_forward(
 def _weights_now(
     back: FloatArray, then: FloatArray, seen: FloatArray, now: FloatArray
 ) -> FloatArray:
-    """Return the models' probabilities now after a look changed those of then."""
+    """Return present model probabilities, corrected by how a late look changed the past ones."""
     if len(now) == 1:
         return now
     changed = seen / np.maximum(then, LEAST)

@@ -7,19 +7,19 @@ import numpy as np
 from pydantic import Field
 
 from components.messages.columns import POSE
-from components.messages.detections import SensorOffer, sensor_offers
-from components.messages.false_detections import true_entries
+from components.messages.detections import SensorOffer, offers_of_fused_sensors
+from components.messages.false_detections import without_false_alarms
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.messages.tracks import Tracks, TracksWithPose
-from components.navigation.errors import navigation_errs
-from components.sensor.marks import TRACKER
-from components.tracking.reported_errors import folded_ranges, unknown_latency
-from dsa_des.arrays.entries import cells_of
+from components.navigation.errors import has_navigation_errors
+from components.sensor.palette import TRACKER
+from components.tracking.reported_errors import folded_range_warnings, latency_warnings
+from dsa_des.arrays.entries import rows_and_columns_of_true
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
-from dsa_des.block.message import Message, offsets_of
+from dsa_des.block.message import Message, offsets_from_entry_rows
 from dsa_des.block.wake import Wake
 from dsa_des.record.failure_counts import Tries
 
@@ -39,7 +39,7 @@ class StubParameters(Parameters):
 
 
 class TrackerStub(Component):
-    """Holds the last fused measurement of each target, its age, and which sensors gave it.
+    """Keeps each target's last fused measurement, age and sensors; associates by true identity.
 
     Tracks are sent at every instant at which at least one target was updated, that is when the
     measurement has come, and within half a second of one being dropped, though nothing comes. Ages
@@ -63,8 +63,8 @@ class TrackerStub(Component):
         return WITHOUT_POSE
 
     def records(self) -> list[type[Message]]:
-        """Return the recorded message types: with the believed pose where navigation errs."""
-        return [TracksWithPose] if navigation_errs(self.context) else [*super().records()]
+        """Return the message types to record; with the believed pose if navigation has errors."""
+        return [TracksWithPose] if has_navigation_errors(self.context) else [*super().records()]
 
     def setup(self) -> None:
         """Start with no tracks."""
@@ -76,28 +76,28 @@ class TrackerStub(Component):
         self._tries = Tries()
 
     def offer(self, port: str) -> Any:
-        """Return the sensors' declarations, with which of them measure range."""
+        """Return, by sensor name, a reduced offer: only whether the sensor measures range."""
         return {
             name: SensorOffer(one.measures_range, 0.0) if isinstance(one, SensorOffer) else None
-            for name, one in sensor_offers(self.context.producers).items()
+            for name, one in offers_of_fused_sensors(self.context.producers).items()
         }
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return in which runs it received false alarms only."""
+        """Return the runs in which only false alarms were received, keyed by message."""
         return self._tries.failure_counts("all that it gets are false alarms, and it holds nothing")
 
     def acts_every_s(self) -> Fraction | None:
-        """Return how often what has grown too old is looked for, s."""
+        """Return the interval, s, of dropping too old measurements; None if never dropped."""
         return None if self.p.drop_after_s is None else _ACTS_EVERY_S
 
     def warnings(self) -> list[str]:
-        """Return a warning for each sensor whose measurements lag behind their targets."""
-        offers = sensor_offers(self.context.producers)
-        return super().warnings() + unknown_latency(offers) + folded_ranges(offers)
+        """Return warnings for unknown latency or ambiguous ranges, which are taken as true."""
+        offers = offers_of_fused_sensors(self.context.producers)
+        return super().warnings() + latency_warnings(offers) + folded_range_warnings(offers)
 
     def run(self, wake: Wake) -> Tracks | None:
         """Process new measurements, and return the held tracks."""
-        fused, counts = self._measured_entries(wake)
+        fused, counts = self._target_measurements(wake)
         if fused is None:
             return None
         updated = (counts if self.p.drop_after_s is None else counts + wake.idle).nonzero()[0]
@@ -108,8 +108,10 @@ class TrackerStub(Component):
         replica = wake.run.take(updated)
         begins = np.concatenate(([True], replica[1:] != replica[:-1]))
         before = self._held.rows_of_runs(replica[begins])
-        targets, column = _held_and_new(before.target, fused.target, len(fused.roster))
-        pool, held, new = _pool(before, fused, replica.take(rows))
+        targets, column = _present_targets_and_columns(
+            before.target, fused.target, len(fused.roster)
+        )
+        pool, held, new = _pool_kept_and_new(before, fused, replica.take(rows))
         last = np.full((len(updated), len(targets)), -1, dtype=np.int64)
         if len(held):
             first_row = begins.nonzero()[0][np.searchsorted(replica[begins], before.replica)]
@@ -124,15 +126,17 @@ class TrackerStub(Component):
             own_from = np.maximum.accumulate(np.where(begins, own_from, 0))
             last[last < own_from[:, np.newaxis]] = -1
         ends = np.append(replica[1:] != replica[:-1], True).nonzero()[0]
-        row, at = cells_of(last[ends] >= 0)
+        row, at = rows_and_columns_of_true(last[ends] >= 0)
         entry = last[ends][row, at]
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[at], **now)
         self._held = self._held.replace_runs(replica[begins], table, wake.first_run)
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
-    def _measured_entries(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
-        """Return measurements of targets, and the number of entries of each wake row."""
+    def _target_measurements(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
+        """Return the received measurements without false alarms (or None), and the number of fused
+        entries at each row of the wake.
+        """
         busy = wake.without_idle()
         fused = self._nothing if busy is None else busy["fused"]
         counts = np.zeros(len(wake), dtype=np.int64)
@@ -141,7 +145,7 @@ class TrackerStub(Component):
         if busy is not None and len(fused.target):
             run = take_runs(busy.run, fused.row_of_entries)
             self._tries = self._tries.add_tries(run, np.ones_like(run), fused.target >= 0)
-        fused = true_entries(fused)
+        fused = without_false_alarms(fused)
         if self.p.drop_after_s is not None:
             self._nothing = fused.take(slice(0, 0))
         if busy is not None:
@@ -158,12 +162,12 @@ class TrackerStub(Component):
         pool: dict[str, Any],
         first: IntArray,
     ) -> Tracks | None:
-        """Return the tracks at rows of the wake; `first` is each one's first entry in the pool.
+        """Return the tracks at rows of the wake, or None; `first` is each row's first new entry.
 
         At an idle row there are some where something has just grown too old.
         """
-        instants = wake.instants.part(rows)
-        row, column = cells_of(last >= 0)
+        instants = wake.instants.take_with_known_positions(rows)
+        row, column = rows_and_columns_of_true(last >= 0)
         entry = last.ravel().take(row * len(targets) + column)
         measured = pool["measured_tick"].take(entry)
         # A sweeping beam measures after its scan has begun, which is when its report is sent.
@@ -177,7 +181,7 @@ class TrackerStub(Component):
             if not shown.any():
                 return None
             kept &= shown[row]
-            instants, first = wake.instants.part(rows[shown]), first[shown]
+            instants, first = wake.instants.take_with_known_positions(rows[shown]), first[shown]
             row = (np.cumsum(shown) - 1)[row]
             row, column, entry, measured, age_s = (
                 values[kept] for values in (row, column, entry, measured, age_s)
@@ -189,7 +193,7 @@ class TrackerStub(Component):
         tracks = message(
             tick=instants.tick,
             run=instants.run,
-            offsets=offsets_of(row, len(instants)),
+            offsets=offsets_from_entry_rows(row, len(instants)),
             target=targets.take(column),
             azimuth_rad=pool["azimuth_rad"].take(entry),
             elevation_rad=pool["elevation_rad"].take(entry),
@@ -207,10 +211,10 @@ class TrackerStub(Component):
         return tracks
 
 
-def _pool(
+def _pool_kept_and_new(
     before: KeyedTable, fused: FusedDetections, replica: IntArray
 ) -> tuple[dict[str, Any], IntArray, IntArray]:
-    """Return everything that may be held, and the places in it of what was and what is new.
+    """Return kept and new measurements' columns together, and the positions in them of each.
 
     What was held comes before what is new of the same replica.
     """
@@ -230,8 +234,12 @@ def _pool(
     return {name: v[order] for name, v in pool.items()}, index[:start], index[start:]
 
 
-def _held_and_new(held: IntArray, new: IntArray, targets: int) -> tuple[IntArray, IntArray]:
-    """Return the targets that are held or newly measured, ascending, and each one's column."""
+def _present_targets_and_columns(
+    held: IntArray, new: IntArray, targets: int
+) -> tuple[IntArray, IntArray]:
+    """Return the indices of targets with a kept or new measurement, ascending, and for every target
+    its column among them.
+    """
     there = np.zeros(targets, dtype=bool)
     there[held] = True
     there[new] = True

@@ -7,12 +7,15 @@ import numpy as np
 
 from components.estimation.batched import is_everything, select_tracks
 from components.estimation.estimator import Estimates, mixture_moments
-from components.estimation.measurement import direction, range_share
+from components.estimation.measurement import (
+    azimuth_elevation_and_variances,
+    relative_range_deviation,
+)
 from components.messages.columns import ORIGIN, OWN_POSITION, STATE
 from components.messages.state_tracks import COVARIANCE, DELETED, StateTracks
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.block.message import offsets_of
+from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Wake
 
 #: Misdetections of a sensor that never hit a track.
@@ -22,7 +25,7 @@ _NUMBERS = 1 << 32
 
 
 class TrackStore(KeyedTable):
-    """Columns over tracks, the tracks on their last axis.
+    """Table of tracks, one column per property, with tracks along the last axis.
 
     States are ``state0``, ``state1``, … (d, n), one for each motion model, covariances
     ``covariance0``, … (d, d, n); ``weights`` (models, n) says how likely each model is.
@@ -62,7 +65,7 @@ class TrackStore(KeyedTable):
 
     @classmethod
     def empty_of_models(cls, sizes: Sequence[int], sensors: int) -> Self:
-        """Return a store without tracks for models with states of these sizes."""
+        """Return an empty table for models with these state sizes and this number of sensors."""
         types: dict[str, type] = {
             **cls.PLAIN,
             "weights": float,
@@ -79,32 +82,32 @@ class TrackStore(KeyedTable):
         return cls.empty(types, shapes)
 
     @property
-    def key(self) -> IntArray:
-        """Of each track a number that no other one has, of any run; ascending in their order."""
+    def unique_numbers(self) -> IntArray:
+        """Integer identifying each track among all runs; ascending in the table's order."""
         return np.asarray(self.replica * _NUMBERS + self.number)
 
     def sorted_by_key(self) -> Self:
-        """Return all tracks by run and number, as searches in them want them."""
+        """Return the tracks sorted by run and then by number."""
         return self.take(np.lexsort((self.number, self.replica)))
 
     def append_deleted(self, before: Self) -> Self:
-        """Return the tracks, and those of some before that are there no more, as deleted."""
-        gone = before.take(~np.isin(before.key, self.key))
+        """Return these tracks and those of `before` that no longer exist, the latter as deleted."""
+        gone = before.take(~np.isin(before.unique_numbers, self.unique_numbers))
         if len(gone) == 0:
             return self
         ended = gone.with_columns(status=np.full(len(gone), DELETED))
         return self.concatenate([self, ended]).sorted_by_key()
 
     def estimates(self) -> Estimates:
-        """Return the filter's estimates of the tracks."""
-        return Estimates(self.states(), self.covariances(), self.weights)
+        """Return states, covariances and model probabilities of all tracks."""
+        return Estimates(self.states_by_model(), self.covariances_by_model(), self.weights)
 
     def replace_estimates(self, estimates: Estimates, **columns: Any) -> Self:
-        """Return the same tracks with other estimates, and other values in some columns."""
+        """Return the tracks with new states, covariances, model probabilities, named columns."""
         return self.with_columns(**estimate_columns(estimates), **columns)
 
     def replace_columns(self, which: IntArray, new: dict[str, Any]) -> Self:
-        """Return tracks with other values in some columns of some of them."""
+        """Return the tracks with new values in some columns for the tracks `which`."""
         if is_everything(which, len(self)):
             return self.with_columns(**new)
         changed = {}
@@ -114,24 +117,25 @@ class TrackStore(KeyedTable):
             changed[name] = whole
         return self.with_columns(**changed)
 
-    def states(self) -> list[AnyArray]:
-        """Return the states of every model."""
+    def states_by_model(self) -> list[AnyArray]:
+        """Return the states of all tracks, an array (size, tracks) for each motion model."""
         return [self.columns[f"state{i}"] for i in range(len(self.weights))]
 
-    def covariances(self) -> list[AnyArray]:
-        """Return the covariances of every model."""
+    def covariances_by_model(self) -> list[AnyArray]:
+        """Return all tracks' covariances, (size, size, tracks) for each motion model."""
         return [self.columns[f"covariance{i}"] for i in range(len(self.weights))]
 
 
 def estimate_columns(estimates: Estimates) -> dict[str, AnyArray]:
-    """Return estimates as columns of a store."""
+    """Return states, covariances and model probabilities as columns of a track store, by name."""
     columns = {f"state{i}": x for i, x in enumerate(estimates.states)}
     columns |= {f"covariance{i}": p for i, p in enumerate(estimates.covariances)}
     return columns | {"weights": estimates.weights}
 
 
-def records_of(replica: IntArray, position_deg_m: FloatArray) -> KeyedTable:
-    """Return what is kept of each run beside its tracks, where it starts at its first look.
+def initial_records(replica: IntArray, position_deg_m: FloatArray) -> KeyedTable:
+    """Return a table with one initial record per run, whose frame has its origin at the ownship's
+    position at the first look.
 
     ``own`` is where the ownship was at the last one, in the frame with that ``origin``, and
     ``worked_tick`` is when that came.
@@ -157,7 +161,7 @@ _MODELS = {
 
 
 def tracks_to_report(store: TrackStore, records: KeyedTable, rows: IntArray) -> TrackStore:
-    """Return the tracks of some replicas as they are to be reported.
+    """Return the tracks of some replicas with the row, ownship position and origin to report.
 
     ``row`` is the row of the wake of each replica's report, as given; ``own`` and ``origin`` are
     where the ownship was, as the records of these replicas have it.
@@ -180,7 +184,7 @@ _UNSHOWN = {
 
 
 def _store_by_row(reported: Sequence[TrackStore]) -> TrackStore:
-    """Return what is shown of all tracks by row; component by component, which stays in caches."""
+    """Return all reported tracks in one table sorted by row of the wake."""
     parts = [part.columns for part in reported]
     row = np.concatenate([part["row"] for part in parts])
     if not bool((row[1:] < row[:-1]).any()):
@@ -196,7 +200,7 @@ def _store_by_row(reported: Sequence[TrackStore]) -> TrackStore:
     return TrackStore(**columns)
 
 
-def state_tracks(
+def state_tracks_message(
     reported: Sequence[TrackStore],
     rows: IntArray,
     wake: Wake,
@@ -204,10 +208,10 @@ def state_tracks(
     passive_range_share: float | None = None,
     errors: int = 0,
 ) -> StateTracks:
-    """Return the message of what is reported, of states that carry so many errors."""
+    """Return the message of these tracks; `errors` is how many sensor errors a state carries."""
     ticks = wake.ticks[rows]
     if not reported:
-        empty = StateTracks.make_initial({}).of_runs(wake.run[rows])
+        empty = StateTracks.make_initial({}).with_runs(wake.run[rows])
         empty.tick, empty.offsets = ticks, np.zeros(len(ticks) + 1, dtype=np.int64)
         empty.sensors = sensors
         return empty
@@ -215,17 +219,17 @@ def state_tracks(
     state, covariance = mixture_moments(tracks.estimates())
     own, origin = tracks.own, tracks.origin
     away = state[:3] - own
-    seen = direction(away, covariance)
+    seen = azimuth_elevation_and_variances(away, covariance)
     unknown = ~tracks.ranged
     if passive_range_share is not None:
-        unknown &= range_share(away, covariance) > passive_range_share
+        unknown &= relative_range_deviation(away, covariance) > passive_range_share
     hidden = bool(unknown.any())
 
     def known(values: FloatArray) -> FloatArray:
         return np.where(unknown, np.nan, values) if hidden else values
 
     extras = {}
-    states = tracks.states()
+    states = tracks.states_by_model()
     for own_state, weight in zip(states, tracks.weights, strict=True) if len(states) > 1 else ():
         probability, names = _MODELS[len(own_state) - errors]
         extras[probability] = weight
@@ -234,7 +238,7 @@ def state_tracks(
     return StateTracks(
         tick=ticks,
         run=wake.run[rows],
-        offsets=offsets_of(np.searchsorted(rows, tracks.row), len(ticks)),
+        offsets=offsets_from_entry_rows(np.searchsorted(rows, tracks.row), len(ticks)),
         track=tracks.number,
         track_status=tracks.status,
         existence=1.0 / (1.0 + np.exp(-tracks.score)),

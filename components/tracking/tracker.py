@@ -10,10 +10,10 @@ from components.estimation.batched import select_tracks
 from components.estimation.estimator import Estimator, ExtendedKalmanFilter
 from components.estimation.frame import pose_in_frame
 from components.estimation.motion import ConstantVelocity
-from components.messages.detections import SensorOffer, sensor_offers
+from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import CONFIRMED, DELETED, StateTracks
-from components.sensor.marks import TRACKER
+from components.sensor.palette import TRACKER
 from components.tracking.association import ASSOCIATIONS, Association
 from components.tracking.due_detections import ACTS_EVERY_S, Silence
 from components.tracking.ladder import LADDERS
@@ -23,24 +23,29 @@ from components.tracking.out_of_sequence import (
     Plan,
     Snapshot,
     late_look_shares,
-    latest_s,
+    late_looks_warning,
+    max_lateness_s,
     may_come_late,
-    plan_of_late,
-    straight_plan,
+    plan_with_late_looks,
+    plan_without_late_looks,
     tracks_before,
-    warning,
 )
 from components.tracking.reported_errors import (
-    coarse_bearings,
-    errors_by_sensors,
-    folded_ranges,
-    unknown_latency,
+    coarse_bearing_warnings,
+    folded_range_warnings,
+    latency_warnings,
+    sensors_by_told_error,
 )
 from components.tracking.rules import TrackerParameters, TrackerRules, range_rate_refusal
-from components.tracking.scans import LookBatch, Scans, scans_of, split_due_looks
+from components.tracking.scans import LookBatch, Scans, looks_of_message, split_due_looks
 from components.tracking.step import late_step, step
-from components.tracking.track_store import TrackStore, records_of, state_tracks, tracks_to_report
-from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
+from components.tracking.track_store import (
+    TrackStore,
+    initial_records,
+    state_tracks_message,
+    tracks_to_report,
+)
+from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
@@ -89,12 +94,12 @@ class Tracker(Component):
         return ExtendedKalmanFilter(ConstantVelocity(self.p.acceleration_intensity_m2_s3))
 
     def association(self) -> Association:
-        """Return what assigns detections to tracks; a subclass may give another."""
+        """Return the method that assigns detections to tracks; a subclass may return another."""
         return ASSOCIATIONS[self.p.association]
 
     def setup(self) -> None:
         """Start with no tracks."""
-        offers = sensor_offers(self.context.producers)
+        offers = offers_of_fused_sensors(self.context.producers)
         if len(offers) > MOST_SENSORS:
             raise ValueError(
                 f"a tracker takes at most {MOST_SENSORS} sensors, and {len(offers)} lead to it: "
@@ -112,23 +117,23 @@ class Tracker(Component):
         self.rules: TrackerRules | None = None
         self._association = self.association()
         self._estimator = self.estimator()
-        if errors := errors_by_sensors(offers):
+        if errors := sensors_by_told_error(offers):
             self._estimator = self._estimator.carrying(tuple(one.lasts_s for one, _ in errors))
         self._sensors: tuple[str, ...] = ()
         self._store = self._empty_store(0)
-        self._records = records_of(np.empty(0, dtype=np.int64), np.empty((3, 0)))
+        self._records = initial_records(np.empty(0, dtype=np.int64), np.empty((3, 0)))
         self._past: Past | None = None
         self._ahead: Scans | None = None
         self._lag_ticks = int(self._lag_s() * self.context.ticks_per_s)
         producers = self.context.producers
-        self._late_ticks = int(latest_s(offers, producers) * self.context.ticks_per_s)
+        self._late_ticks = int(max_lateness_s(offers, producers) * self.context.ticks_per_s)
         # Where nothing can come late there is nothing to remember, whatever `late` says.
         self._remembers = may_come_late(offers, self.context.producers)
         self._count, self._early = LookCount(), 0
         self._tries = Tries()
 
     def adopt_state(self, before: Any) -> None:
-        """Go on with the tracks there are, by rules of its own."""
+        """Go on with another instance's tracks; ValueError if its states have another size."""
         super().adopt_state(before)
         kept, now = ([m.size for m in one._estimator.models] for one in (before, self))
         if kept != now:
@@ -141,27 +146,27 @@ class Tracker(Component):
         self._remembers = self._remembers or before._remembers
 
     def _rules_for(self, sensors: tuple[str, ...]) -> TrackerRules:
-        offers, per_s = sensor_offers(self.context.producers), self.context.ticks_per_s
+        offers, per_s = offers_of_fused_sensors(self.context.producers), self.context.ticks_per_s
         return TrackerRules.of(self.p, self._estimator, offers, sensors, per_s)
 
     def acts_every_s(self) -> Fraction | None:
-        """Return how often tracks are looked through that nothing comes of, s."""
+        """Return the interval, s, of checking for tracks to end for lack of detections."""
         return ACTS_EVERY_S
 
     def _lag_s(self) -> Fraction:
         if self.p.lag_s is not None:
             return Fraction(self.p.lag_s)
         producers = self.context.producers
-        return max(Fraction(1), latest_s(sensor_offers(producers), producers))
+        return max(Fraction(1), max_lateness_s(offers_of_fused_sensors(producers), producers))
 
     def warnings(self) -> list[str]:
-        """Return a warning for each sensor whose looks come too late, with their number."""
+        """Return warnings on looks that may be too late and on unmodelled sensor errors."""
         lag_s, why = self._lag_s(), f"lag_s is {float(self._lag_s()):g}"
         if self.p.late == "drop":
             lag_s, why = Fraction(0), "late is 'drop'"
-        offers = sensor_offers(self.context.producers)
+        offers = offers_of_fused_sensors(self.context.producers)
         shares = late_look_shares(offers, lag_s, self.context.duration_s)
-        result = [warning(n, share, why) for n, share in shares.items()]
+        result = [late_looks_warning(n, share, why) for n, share in shares.items()]
         for name, offer in sorted(offers.items()):
             if not isinstance(offer, SensorOffer) or offer.lasting is None:
                 result.append(
@@ -169,13 +174,18 @@ class Tracker(Component):
                     "(SensorOffer.lasting): all are taken for new, and tracks are too sure where "
                     "they are not"
                 )
-        if not self._estimator.errors:
-            result += unknown_latency(offers)
-        return super().warnings() + result + coarse_bearings(offers) + folded_ranges(offers)
+        if not self._estimator.error_count:
+            result += latency_warnings(offers)
+        return (
+            super().warnings()
+            + result
+            + coarse_bearing_warnings(offers)
+            + folded_range_warnings(offers)
+        )
 
     def offer(self, port: str) -> Any:
-        """Return the sensors' declarations, with ranges where directions give them."""
-        offers = sensor_offers(self.context.producers)
+        """Return the sensors' offers by name, as measuring range if passive ranging gives it."""
+        offers = offers_of_fused_sensors(self.context.producers)
         if self.p.passive_range_share is None:
             return offers
         return {
@@ -184,14 +194,14 @@ class Tracker(Component):
         }
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return whose looks came too late, and in which runs no track was confirmed."""
+        """Return late looks by sensor, and runs with detections but no confirmed track."""
         return self._count.failure_counts() | self._tries.failure_counts(
             "detections came, and no track was ever confirmed"
         )
 
     def skipped_work_notes(self) -> list[str]:
         """Return a sentence for each sensor whose range rates are not used, with the reason."""
-        offers = sensor_offers(self.context.producers)
+        offers = offers_of_fused_sensors(self.context.producers)
         return [
             f"range rates of {name}: {why}"
             for name, offer in sorted(offers.items())
@@ -211,22 +221,22 @@ class Tracker(Component):
             reported, worked = self._process_looks(busy, wake)
         silence = self._silence(wake, worked)
         if len(self._store) and len(silence):
-            spans = silence.silence_after_work(self._records.replica, self._records.worked_tick)
+            spans = silence.silent_rows_after_work(self._records.replica, self._records.worked_tick)
             self._store, more = silence.end_silent_tracks(self._store, self._records, *spans)
             reported += more
         rows = np.unique(np.concatenate([worked, *(part.row[:1] for part in reported)]))
         if len(rows) == 0:
             return None
-        share, errors = self.p.passive_range_share, self._estimator.errors
-        return state_tracks(reported, rows, wake, self._sensors, share, errors)
+        share, errors = self.p.passive_range_share, self._estimator.error_count
+        return state_tracks_message(reported, rows, wake, self._sensors, share, errors)
 
     def _silence(self, wake: Wake, worked: IntArray) -> Silence:
-        """Return the rows of a wake beside those that bring work."""
+        """Return the rows of the wake at which nothing is processed."""
         rows = np.delete(np.arange(len(wake)), worked)
         return Silence(wake.instants, rows, self._late_ticks, self.context.ticks_per_s)
 
     def _process_looks(self, busy: Wake, wake: Wake) -> tuple[list[TrackStore], IntArray]:
-        """Work on the looks that came; return what is reported, and the rows that brought work.
+        """Process the looks; return tracks to report, and wake rows with processed looks.
 
         `busy` are the rows of the wake at which something came.
         """
@@ -237,12 +247,12 @@ class Tracker(Component):
             self._sensors = fused.sensors
             self.rules = self._rules_for(fused.sensors)
             self._store = self._empty_store(len(fused.sensors))
-        came = scans_of(fused)
+        came = looks_of_message(fused)
         self._early += int((came.tick > busy.ticks[came.row]).sum())
         scans, self._ahead = split_due_looks(came, self._ahead, busy)
         if len(scans) == 0:
             return [], _NO_ROWS
-        records = self._records.latest_or_new(records_of(scans.run, scans.pose[:3]))
+        records = self._records.kept_rows_or_new(initial_records(scans.run, scans.pose[:3]))
         store = self._store.take(self._store.replica >= wake.first_run)
         begin, before, waiting = 0, dict[int, Snapshot](), None
         if self._past is not None:
@@ -252,29 +262,29 @@ class Tracker(Component):
         of = np.searchsorted(records.replica, scans.run)
         kept: list[int] = []
         if not self._remembers:
-            plan, left_out = straight_plan(scans, of, records.tick)
+            plan, left_out = plan_without_late_looks(scans, of, records.tick)
         else:
-            plan, left_out, kept = plan_of_late(
+            plan, left_out, kept = plan_with_late_looks(
                 scans, of, begin, self._lag_ticks, rerun=self.p.late == "rerun"
             )
         self._count = self._count.add_looks(fused.sensors, scans, slice(begin, None), left_out)
         moves = scans.velocity if self.rules.rates_of else None
         origin = select_tracks(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
-        codes = scans.kinds(self.rules.rates_of, self.rules.carried is not None)
+        codes = scans.detection_kinds(self.rules.rates_of, self.rules.carried is not None)
         turned = scans.rotate_to_frame(origin)
         reported: list[TrackStore] = []
-        reports = plan.reports
+        reports = plan.is_reported_after
         # The row of the wake that each work is of.
         row = plan.row if busy is wake else np.flatnonzero(~wake.idle)[plan.row]
         rows = np.unique(row)
         silence, first, last = self._silence(wake, rows), row, row - 1
         if len(silence):
-            first, last = silence.silence_since_work(row, records.worked_tick[plan.of])
+            first, last = silence.silent_rows_before_work(row, records.worked_tick[plan.of])
         records.worked_tick[plan.of] = wake.ticks[row]
         # Tracks as last shown, of runs in a row that brings several works: one may end in between.
-        shown_last, begins = store.take(_NO_ROWS), plan.begins
-        for works in occurrences_by_turn(plan.of):
+        shown_last, begins = store.take(_NO_ROWS), plan.begins_several
+        for works in indices_by_occurrence(plan.of):
             if len(store) and bool((first[works] <= last[works]).any()):
                 asked = records.take(plan.of[works])
                 store, more = silence.end_silent_tracks(store, asked, first[works], last[works])
@@ -297,7 +307,7 @@ class Tracker(Component):
                 self._count = self._count.add_looks(fused.sensors, scans, slice(0), too_late)
             looks, mine = plan.look[works_now], plan.of[works_now]
             if self._remembers:
-                store = self._remember(store, records, plan, works_now, before)
+                store = self._restore_and_snapshot(store, records, plan, works_now, before)
             if len(looks):
                 store, records.next_number[mine] = step(
                     self.rules, self._association, store,
@@ -319,11 +329,11 @@ class Tracker(Component):
         self._store = store
         if self._remembers:
             self._past = Past.from_looks(scans, kept, before, waiting)
-        self._note(came, reported)
+        self._count_detected_and_confirmed(came, reported)
         return reported, rows
 
-    def _note(self, came: Scans, reported: list[TrackStore]) -> None:
-        """Record in which runs a detection came, and in which a track was confirmed."""
+    def _count_detected_and_confirmed(self, came: Scans, reported: list[TrackStore]) -> None:
+        """Count runs in which a detection was received, and those with a confirmed track."""
         detected = came.run[np.diff(came.offsets) > 0]
         self._tries = self._tries.add_tries(
             detected, np.ones_like(detected), np.zeros(len(detected), dtype=bool)
@@ -334,7 +344,7 @@ class Tracker(Component):
                 sure, np.ones_like(sure), np.ones(len(sure), dtype=bool)
             )
 
-    def _remember(
+    def _restore_and_snapshot(
         self,
         store: TrackStore,
         records: KeyedTable,
@@ -342,7 +352,9 @@ class Tracker(Component):
         works: IntArray,
         before: dict[int, Snapshot],
     ) -> TrackStore:
-        """Go back where late looks ask for it, and note how things are before each look."""
+        """Return the tracks, set back to before a late look where the plan asks for it, and save a
+        snapshot before each look.
+        """
         late = works[plan.back_to[works] >= 0]
         if len(late):
             of, back = plan.of[late], plan.back_to[late].tolist()
@@ -359,6 +371,6 @@ class Tracker(Component):
         return store
 
     def report(self) -> dict[str, Any]:
-        """Return whose looks came too late, and how many had to wait for their own instant."""
-        late = {self.name: self._count.late()}
+        """Return how many looks came too late, by sensor, and how many before their instant."""
+        late = {self.name: self._count.late_look_statistics()}
         return {"late_looks": late, "early_looks": {self.name: self._early}}

@@ -7,7 +7,7 @@ import numpy as np
 
 from components.formats.recorded.traffic_of_files import clock
 from components.formats.text_rows import TrafficFile, TrafficFileError
-from components.traffic.files import FileTrafficParameters, traffic_of
+from components.traffic.files import FileTrafficParameters, read_selected_traffic
 from dsa_des.errors import UsageError
 from dsa_des.scene.data_files import DataScene
 from dsa_des.text.safe_text import shell_line, shorten
@@ -16,10 +16,10 @@ _MOST_NAMES = 6
 
 
 def scene_of_recording(path: Path) -> DataScene:
-    """Return a scene of detect_and_sense with the aircraft of a file, and what is in the file."""
+    """Return a scene that flies a recorded file before sensors, and the file's description."""
     file = str(path.absolute())
     try:
-        content = traffic_of(FileTrafficParameters(file=Path(file)))
+        content = read_selected_traffic(FileTrafficParameters(file=Path(file)))
     except TrafficFileError as error:
         raise UsageError(*str(error).split("\n")) from None
     traffic = {
@@ -36,7 +36,7 @@ def scene_of_recording(path: Path) -> DataScene:
 
 
 def describe_file(path: Path, content: TrafficFile) -> list[str]:
-    """Return what a file holds, in lines: what it is, who, when, where, and what to type."""
+    """Return text lines on a file: format, aircraft, times, area, heights, usable commands."""
     aircraft = content.aircraft
     first = min(float(craft.sample_times_s[0]) for craft in aircraft)
     last = max(float(craft.sample_times_s[-1]) for craft in aircraft)

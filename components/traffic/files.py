@@ -20,13 +20,13 @@ from components.traffic.recorded import (
     RecordedTraffic,
     RecordedTrafficParameters,
 )
-from components.traffic.scripted import Ownship, flight_of
+from components.traffic.scripted import Ownship, scripted_flight
 from dsa_des.block.component import Parameters, ScenePath
-from dsa_des.files.input_files import cache_reads, is_folder
+from dsa_des.files.input_files import cache_file_reads, is_folder
 
 
 class Box(Parameters):
-    """Between which latitudes and longitudes aircraft are taken."""
+    """Limits of latitude and longitude within which aircraft are taken from files."""
 
     south_deg: float = Field(default=-90.0, ge=-90, le=90, description="Southern edge, deg.")
     north_deg: float = Field(default=90.0, ge=-90, le=90, description="Northern edge, deg.")
@@ -44,8 +44,10 @@ class Box(Parameters):
             )
         return self
 
-    def edges(self) -> tuple[float, float, float, float]:
-        """Return south, north, west and east, which is beyond the west."""
+    def south_north_west_east_deg(self) -> tuple[float, float, float, float]:
+        """Return the southern, northern, western and eastern limit in degrees, where the eastern
+        exceeds the western (above 180 if need be).
+        """
         east = self.east_deg
         while east <= self.west_deg:
             east += 360.0
@@ -53,7 +55,7 @@ class Box(Parameters):
 
 
 class Moved(Parameters):
-    """How far a flight is moved as it is."""
+    """Offset north, east and up by which a flight is shifted without changing its shape."""
 
     north_m: float = Field(default=0.0, description="To the north, m.")
     east_m: float = Field(default=0.0, description="To the east, m.")
@@ -61,7 +63,7 @@ class Moved(Parameters):
 
 
 class Place(Parameters):
-    """Where something stands."""
+    """Geodetic position: latitude (deg), longitude (deg) and altitude (m)."""
 
     lat_deg: float = Field(ge=-90, le=90, description="Latitude, deg.")
     lon_deg: float = Field(ge=-360, le=360, description="Longitude, deg.")
@@ -137,7 +139,7 @@ class FileTrafficParameters(RecordedTrafficParameters):
         return self
 
     def paths(self) -> tuple[Path, ...]:
-        """Return the files; those of folders sorted by their names."""
+        """Return the paths of all traffic files; a folder stands for its files, sorted by name."""
         found: list[Path] = []
         for path in self.file if isinstance(self.file, list) else [self.file]:
             if is_folder(path):
@@ -151,8 +153,8 @@ class FileTrafficParameters(RecordedTrafficParameters):
             raise ValueError("file: must name at least one file")
         return tuple(found)
 
-    def choice(self) -> TrafficChoice:
-        """Return the selection of the files' aircraft and times."""
+    def traffic_choice(self) -> TrafficChoice:
+        """Return which aircraft, times, heights and area of the files to take, and the ownship."""
         lowest, highest = self.lowest_m, self.highest_m
         offset, place = self.own_moved, self.place
         return TrafficChoice(
@@ -165,7 +167,7 @@ class FileTrafficParameters(RecordedTrafficParameters):
             scripted=self.own_flight is not None,
             from_s=self.from_s,
             to_s=self.to_s,
-            box=None if self.box is None else self.box.edges(),
+            box=None if self.box is None else self.box.south_north_west_east_deg(),
             heights=(
                 -math.inf if lowest is None else lowest, math.inf if highest is None else highest
             ),
@@ -175,7 +177,7 @@ class FileTrafficParameters(RecordedTrafficParameters):
 
 
 class FileTraffic(RecordedTraffic):
-    """Recorded aircraft from files of any known kind, and an own flight among them.
+    """Traffic from files of any known format; the ownship is one of the aircraft or scripted.
 
     Receivers' logs and services' downloads, tables, GPX, KML, IGC, logs of PX4 and MAVLink, ASTERIX
     (062, 021; also captured), DAIDALUS: which it is shows in the content.
@@ -186,22 +188,22 @@ class FileTraffic(RecordedTraffic):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self._let_ownship_be(parameters.own_flight)
+        self._set_ownship_properties(parameters.own_flight)
 
     def read(self) -> TrafficFile:
         """Return the selected flights of the files, with heights above the ellipsoid."""
         air = self.air if self.p.heights == "geometric" else None
-        return traffic_of(self.p, 0.0 if air is None else air.geoid_m)
+        return read_selected_traffic(self.p, 0.0 if air is None else air.geoid_m)
 
     def own_flight(self) -> Trajectory:
         """Return the ownship's flight, recorded or scripted."""
         if (given := self.p.own_flight) is None:
             return self.content.ownship
-        own = given.in_air(self.air)
-        return flight_of(own, own.start, self.wind)
+        own = given.with_ellipsoid_heights(self.air)
+        return scripted_flight(own, own.start, self.wind)
 
-    def file_names(self) -> str:
-        """Return the names of the files, for messages."""
+    def files_text(self) -> str:
+        """Return text that names the files in messages: the first one, and how many more."""
         first, *others = self.p.paths()
         return f"{first} and {len(others)} more" if others else str(first)
 
@@ -223,14 +225,14 @@ class DaaFile(RecordedTraffic):
     lockstep = True
 
     def read(self) -> TrafficFile:
-        """Return the content of the file."""
+        """Return the aircraft in the DAIDALUS traffic file."""
         p = self.p
         return _read_daa(p.file, p.reference_lat_deg, p.reference_lon_deg, p.reference_alt_m)
 
 
-def traffic_of(parameters: FileTrafficParameters, geoid_m: float = 0.0) -> TrafficFile:
-    """Return what is taken of files, where sea level lies so high above the ellipsoid."""
-    choice = replace(parameters.choice(), geoid_m=geoid_m)
+def read_selected_traffic(parameters: FileTrafficParameters, geoid_m: float = 0.0) -> TrafficFile:
+    """Return the aircraft selected from the files; `geoid_m`: sea level above the ellipsoid, m."""
+    choice = replace(parameters.traffic_choice(), geoid_m=geoid_m)
     content: TrafficFile = _read(parameters.paths(), choice)
     return content
 
@@ -238,5 +240,5 @@ def traffic_of(parameters: FileTrafficParameters, geoid_m: float = 0.0) -> Traff
 #: Earlier names of what reads files of any kind.
 CsvFile = AsterixFile = FileTraffic
 
-_read = cache_reads(4)(read_traffic)
-_read_daa = cache_reads(4)(read_daa)
+_read = cache_file_reads(4)(read_traffic)
+_read_daa = cache_file_reads(4)(read_daa)

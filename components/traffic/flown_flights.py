@@ -21,7 +21,7 @@ from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 
 
 class OfEachRun(Fleet):
-    """One of the targets of each run, by its index, as a fleet of one for each run."""
+    """The flights of one target, chosen by its index in each run, as a fleet of one per run."""
 
     def __init__(self, targets: Fleet, width: int, index: int) -> None:
         self._targets, self._width, self._index = targets, width, index
@@ -33,20 +33,20 @@ class OfEachRun(Fleet):
         return self._targets[range(len(self))[run] * self._width + self._index]
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states (n,) in some runs, each at a time (n,) of its own, in s."""
+        """Return the state of the target in the given runs (n,), each at its own time in s (n,)."""
         return self._targets.each(aircraft * self._width + self._index, time_s)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
+        """Return the target's ground speed in runs at given times, m/s; NaN if not scripted."""
         return self._targets.ground_speeds_mps(aircraft * self._width + self._index, time_s)
 
     def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
+        """Return fixed yaw, pitch, roll (3, n), rad, of the target by run and time; NaN: free."""
         return self._targets.fixed_attitudes_rad(aircraft * self._width + self._index, time_s)
 
 
 class OfPlatforms(Fleet):
-    """The flights of platforms, a flight of the first in each run, then those of the next one."""
+    """Several platforms' flights as one fleet: all runs of the first, then of the next."""
 
     def __init__(self, flights: Sequence[Fleet], targets: Fleet, platforms: Sequence[int]) -> None:
         self.own, self._flights, self._runs = flights[0], flights, len(flights[0])
@@ -62,24 +62,28 @@ class OfPlatforms(Fleet):
 
     @cached_property
     def max_speeds_mps(self) -> FloatArray:
-        """Largest speed of each along its path, shape (flights,)."""
+        """Largest speed of each flight along its path, m/s, shape (flights,)."""
         return np.concatenate([flights.max_speeds_mps for flights in self._flights])
 
     @cached_property
     def intervals_present_s(self) -> FloatArray:
-        """First and last time at which each is there, shape (flights, 2)."""
+        """First and last time at which each flight is present, s, shape (flights, 2)."""
         return np.concatenate([flights.intervals_present_s for flights in self._flights])
 
-    def _split(self, aircraft: IntArray) -> tuple[IntArray, IntArray, IntArray]:
-        """Return which are ownships, which targets, and which of the targets these are."""
+    def _split_ownships_and_targets(
+        self, aircraft: IntArray
+    ) -> tuple[IntArray, IntArray, IntArray]:
+        """Return the positions of the ownships among the given flights, those of the targets, and
+        the index of each such target in the target fleet.
+        """
         place, run = np.divmod(aircraft, self._runs)
         targets = place.nonzero()[0]
         of = run[targets] * self._width + self._platforms[place[targets]]
         return (place == 0).nonzero()[0], targets, of
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of flights (n,), each at a time (n,) of its own, in s."""
-        own, targets, of = self._split(aircraft)
+        """Return the state of each given flight (n,) at its own time in s (n,)."""
+        own, targets, of = self._split_ownships_and_targets(aircraft)
         if not len(targets):
             return self.own.each(aircraft, time_s)
         others = self._targets.each(of, time_s[targets])
@@ -89,16 +93,16 @@ class OfPlatforms(Fleet):
         return assemble_rows([own, targets], parts)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return speeds over ground, asked for as in `each`; NaN where no script says them."""
-        own, targets, of = self._split(aircraft)
+        """Return each flight's ground speed at its own time, m/s; NaN if no script states it."""
+        own, targets, of = self._split_ownships_and_targets(aircraft)
         speed_mps = np.empty(len(aircraft))
         speed_mps[own] = self.own.ground_speeds_mps(aircraft[own], time_s[own])
         speed_mps[targets] = self._targets.ground_speeds_mps(of, time_s[targets])
         return speed_mps
 
     def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return fixed yaw, pitch and roll (3, n), asked for as in `each`; NaN where not fixed."""
-        own, targets, of = self._split(aircraft)
+        """Return the flights' fixed yaw, pitch, roll (3, n), rad, at times; NaN where not fixed."""
+        own, targets, of = self._split_ownships_and_targets(aircraft)
         fixed_rad = np.empty((3, len(aircraft)))
         fixed_rad[:, own] = self.own.fixed_attitudes_rad(aircraft[own], time_s[own])
         fixed_rad[:, targets] = self._targets.fixed_attitudes_rad(of, time_s[targets])
@@ -106,7 +110,7 @@ class OfPlatforms(Fleet):
 
 
 class WithOthers(Fleet):
-    """Targets of which some fly otherwise: by index in a run, a fleet of one for each run."""
+    """The targets of all runs, of which those with some indices are replaced by other flights."""
 
     def __init__(self, targets: Fleet, width: int, others: Mapping[int, Fleet]) -> None:
         self._targets, self._width, self._others = targets, width, others
@@ -120,7 +124,7 @@ class WithOthers(Fleet):
 
     @cached_property
     def max_speeds_mps(self) -> FloatArray:
-        """Largest speed of each along its path, shape (flights,)."""
+        """Largest speed of each flight along its path, m/s, shape (flights,)."""
         result = self._targets.max_speeds_mps.copy()
         for column, others in self._others.items():
             result[column :: self._width] = others.max_speeds_mps
@@ -128,14 +132,14 @@ class WithOthers(Fleet):
 
     @cached_property
     def intervals_present_s(self) -> FloatArray:
-        """First and last time at which each is there, shape (flights, 2)."""
+        """First and last time at which each flight is present, s, shape (flights, 2)."""
         result = self._targets.intervals_present_s.copy()
         for column, others in self._others.items():
             result[column :: self._width] = others.intervals_present_s
         return result
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return states of flights (n,), each at a time (n,) of its own, in s."""
+        """Return the state of each given flight (n,) at its own time in s (n,)."""
         run, column = np.divmod(aircraft, self._width)
         left: BoolArray = np.ones(len(aircraft), dtype=bool)
         rows, states = [], []
@@ -150,7 +154,7 @@ class WithOthers(Fleet):
 
 
 class FlightsOfRuns(NamedTuple):
-    """The flights of all runs: an ownship each, and the targets of all one after the other."""
+    """The flights of many runs: one ownship per run, and all targets, grouped by run."""
 
     own: Fleet
     targets: Fleet
@@ -159,7 +163,7 @@ class FlightsOfRuns(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class FlownFlights:
-    """The flights of all runs with the manoeuvres that came so far; see `messages.known_flights`.
+    """The flights of all runs, including the manoeuvres commanded so far.
 
     An ownship for each run, and the targets of run 0, those of run 1, and so on. `platforms` are
     those that may be steered or looked from: the ownship (-1) first, and targets by their index.
@@ -180,7 +184,7 @@ class FlownFlights:
 
     @classmethod
     def of(cls, own: Fleet, targets: Fleet, platforms: Sequence[int]) -> FlownFlights:
-        """Return the flights of all runs, with the ownship and targets by index as platforms."""
+        """Return all runs' flights, unsteered; `platforms` index targets steered or viewed from."""
         width = len(targets) // len(own)
         others = sorted({index for index in platforms if index >= 0})
         flights = [own, *(OfEachRun(targets, width, index) for index in others)]
@@ -190,38 +194,38 @@ class FlownFlights:
 
     @property
     def runs(self) -> int:
-        """How many runs there are."""
+        """Number of runs."""
         return len(self.fleet) // len(self.platforms)
 
     @property
-    def width(self) -> int:
-        """Return the number of targets of a run."""
+    def targets_per_run(self) -> int:
+        """Number of targets in each run."""
         return len(self.targets) // self.runs
 
     @cached_property
-    def place_of_target(self) -> IntArray:
-        """Return the index among platforms of each target of a run, 0 for no platform."""
-        places = np.zeros(self.width, dtype=np.int64)
+    def platform_index_of_targets(self) -> IntArray:
+        """Each target's index among the platforms in a run; 0 if the target is no platform."""
+        places = np.zeros(self.targets_per_run, dtype=np.int64)
         places[list(self.platforms[1:])] = np.arange(1, len(self.platforms))
         return places
 
-    def of_platform(self, platform: int) -> SteeredFleet:
-        """Return a platform's flights, one for each run."""
+    def flights_of_platform(self, platform: int) -> SteeredFleet:
+        """Return the flights of a platform including manoeuvres, one for each run."""
         if len(self.platforms) == 1:
             return self.fleet
         begin = self.platforms.index(platform) * self.runs
-        return self.fleet.part(slice(begin, begin + self.runs), self.nominal(platform))
+        return self.fleet.part(slice(begin, begin + self.runs), self.nominal_flights(platform))
 
-    def nominal(self, platform: int) -> Fleet:
-        """Return a platform's flights without manoeuvres, one for each run."""
+    def nominal_flights(self, platform: int) -> Fleet:
+        """Return the flights of a platform as scripted, without manoeuvres, one for each run."""
         if platform >= 0:
-            return OfEachRun(self.targets, self.width, platform)
+            return OfEachRun(self.targets, self.targets_per_run, platform)
         flights = self.fleet.nominal
         return flights.own if isinstance(flights, OfPlatforms) else flights
 
     @property
     def traffic(self) -> object:
-        """The same for all flights of one traffic: its targets."""
+        """The target fleet, as an identity that is the same for a traffic block's views."""
         return self.targets
 
     @property
@@ -231,22 +235,24 @@ class FlownFlights:
 
     @cached_property
     def steered_targets(self) -> tuple[int, ...]:
-        """The targets that have got manoeuvres in any run, by their index."""
+        """Indices of the targets that have been given a manoeuvre in any run."""
         count = self.fleet.manoeuvre_count.reshape(len(self.platforms), -1).sum(axis=1)
         of_each = zip(self.platforms, count.tolist(), strict=True)
         return tuple(index for index, many in of_each if index >= 0 and many)
 
     def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
-        """Return the viewing platform's flight and its targets' flights, without manoeuvres."""
+        """Return the flights of a viewing platform, and those of all targets with the ownship in
+        the viewer's place, both without manoeuvres.
+        """
         if viewer < 0:
-            return self.nominal(viewer), self.targets
-        others = {viewer: self.nominal(-1)}
-        return self.nominal(viewer), WithOthers(self.targets, self.width, others)
+            return self.nominal_flights(viewer), self.targets
+        others = {viewer: self.nominal_flights(-1)}
+        return self.nominal_flights(viewer), WithOthers(self.targets, self.targets_per_run, others)
 
     def flown_target_flights(self) -> Fleet:
-        """Return the flights of the targets with all manoeuvres."""
-        steered = {index: self.of_platform(index) for index in self.steered_targets}
-        return WithOthers(self.targets, self.width, steered) if steered else self.targets
+        """Return the flights of all targets including the manoeuvres commanded so far."""
+        steered = {index: self.flights_of_platform(index) for index in self.steered_targets}
+        return WithOthers(self.targets, self.targets_per_run, steered) if steered else self.targets
 
     def platform_at(
         self,
@@ -256,8 +262,8 @@ class FlownFlights:
         known: IntArray | None = None,
         state: TrajectoryState | None = None,
     ) -> TrajectoryState:
-        """Return the states of a platform in runs (n,), each at a time (n,) of its own, by the
-        first `known` of its manoeuvres, or all; `state` is what is known of them but for the wind.
+        """Return the states of a platform in the given runs (n,), each at its own time, flown with
+        its first `known` manoeuvres or all; `state` gives them without wind if already computed.
         """
         place = self.platforms.index(platform)
         return self._flown_at(run + place * self.runs if place else run, time_s, known, state)
@@ -269,7 +275,7 @@ class FlownFlights:
         known: IntArray | None,
         state: TrajectoryState | None = None,
     ) -> TrajectoryState:
-        """Return the states of flights of the fleet, as in `platform_at`."""
+        """Return the states of flights by index in the steered fleet, each at its own time."""
         fleet = self.fleet
         state = fleet.each(number, time_s, known) if state is None else state
         for crabbing in self.crabbing:
@@ -284,14 +290,14 @@ class FlownFlights:
         state: TrajectoryState | None = None,
         known: IntArray | None = None,
     ) -> TrajectoryState:
-        """Return the states of targets (n,), each at a time (n,) of its own; `state` is what is
-        known of them but for manoeuvres and the wind. Of manoeuvres the first `known` (n,
+        """Return the states of targets (n,), each at its own time, with manoeuvres and wind;
+        `state` gives them without both if already computed. Of manoeuvres the first `known` (n,
         platforms) count, or all.
         """
         if not self.steered_targets:
             return self._scripted_states(target, time_s, state)
-        run, column = np.divmod(target, self.width)
-        place = self.place_of_target[column]
+        run, column = np.divmod(target, self.targets_per_run)
+        place = self.platform_index_of_targets[column]
         mine, left = place.nonzero()[0], (place == 0).nonzero()[0]
         place = place[mine]
         counts = None if known is None else known[mine, place]
@@ -305,15 +311,16 @@ class FlownFlights:
     def _scripted_states(
         self, target: IntArray, time_s: FloatArray, state: TrajectoryState | None
     ) -> TrajectoryState:
-        """Return the states of targets without their manoeuvres, as in `targets_at`."""
+        """Return the states of targets as scripted, without manoeuvres but turned into the wind."""
         state = self.targets.each(target, time_s) if state is None else state
         for crabbing in self.crabbing:
             speed_mps = self.targets.ground_speeds_mps(target, time_s)
             state = crabbing(state, speed_mps, self.targets.fixed_attitudes_rad(target, time_s))
         return state
 
-    def once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
-        """Return what was made under a name of equal arrays, or make it; the last one is kept.
+    def compute_once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+        """Return the value stored under a name if it was made for equal arrays, else call `make`
+        and store its result in place of the last one.
 
         Those who look from several platforms ask for the same of all aircraft.
         """
@@ -331,18 +338,20 @@ class FlownFlights:
         ahead_s: FloatArray | float,
         viewer: int,
     ) -> tuple[TrajectoryState, TrajectoryState]:
-        """Return states of who looks and of targets; see `messages.known_flights.AllFlights`."""
-        time_s = self._published_s(run, time_s) + ahead_s
+        """Return the viewing platform's states and its targets', at given times of runs."""
+        time_s = self._last_publication_s(run, time_s) + ahead_s
         shape = np.broadcast_shapes(time_s.shape, run.shape, columns.shape)
         target, times, runs = (
             np.broadcast_to(of, shape).reshape(-1)
-            for of in (run * self.width + columns, time_s, run)
+            for of in (run * self.targets_per_run + columns, time_s, run)
         )
         counts = None
         if self.steered_targets:
             counts = np.broadcast_to(known, (*shape, known.shape[-1])).reshape(len(times), -1)
         key = target, times, known
-        others = self.once("targets", key, lambda: self.targets_at(target, times, known=counts))
+        others = self.compute_once(
+            "targets", key, lambda: self.targets_at(target, times, known=counts)
+        )
         mine = np.flatnonzero(np.broadcast_to(columns, shape).reshape(-1) == viewer)
         if len(mine) != time_s.size or viewer < 0:
             looking = self._viewer_state(viewer, run, known, time_s)
@@ -351,7 +360,7 @@ class FlownFlights:
         if len(mine):  # the two have changed places
             counts = np.broadcast_to(known[..., 0], shape).reshape(-1)[mine]
             key = runs[mine], times[mine], counts
-            own = self.once("own", key, lambda: self.platform_at(-1, *key))
+            own = self.compute_once("own", key, lambda: self.platform_at(-1, *key))
             values = [part.copy() for part in others.arrays()]
             for part, new in zip(values, own.arrays(), strict=True):
                 part[mine] = new
@@ -365,11 +374,11 @@ class FlownFlights:
             others = replace(others, present=others.present & near)
         return looking, others.reshape(shape)
 
-    def own_states(
+    def viewer_states(
         self, run: IntArray, known: IntArray, time_s: FloatArray, viewer: int
     ) -> TrajectoryState:
-        """Return states of who looks; see `messages.known_flights.AllFlights`."""
-        return self._viewer_state(viewer, run, known, self._published_s(run, time_s))
+        """Return the states of the viewing platform alone, at given times of given runs."""
+        return self._viewer_state(viewer, run, known, self._last_publication_s(run, time_s))
 
     def _viewer_state(
         self, viewer: int, run: IntArray, known: IntArray, time_s: FloatArray
@@ -379,8 +388,8 @@ class FlownFlights:
         state = self.platform_at(viewer, runs, time_s.reshape(-1), counts)
         return state.reshape(time_s.shape)
 
-    def _published_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return the times of the last publications."""
+    def _last_publication_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:
+        """Return, for each run and time, the time of the last publication of the traffic, s."""
         if self.rates_hz is None:
             return time_s
         rate = self.rates_hz[run]

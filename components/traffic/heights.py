@@ -9,7 +9,7 @@ from dsa_des.block.component import Parameters
 
 
 class Heights(Parameters):
-    """What altitudes are that are said of flights."""
+    """States what flights' altitudes are: above the ellipsoid, above sea level, or pressure."""
 
     heights: Literal["geometric", "sea_level", "pressure"] = Field(
         default="geometric",
@@ -19,7 +19,7 @@ class Heights(Parameters):
     )
 
     def height_m(self, air: Air | None, altitude_m: Any) -> Any:
-        """Return heights above the ellipsoid, m, of altitudes in a scene's air (None: standard).
+        """Return heights above the ellipsoid, m, by `heights`; unchanged if `air` is None.
 
         None is the standard's, in which they are the same numbers.
         """

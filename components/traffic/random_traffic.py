@@ -15,7 +15,7 @@ from components.aircraft.equipage import EquipageShares, draw_equipage
 from components.flights.closest_approach import RegularTimes, SampleTimes
 from components.flights.many_flights import straight_fleet
 from components.geometry import enu_to_geodetic
-from components.traffic.scripted import Ownship, flight_of
+from components.traffic.scripted import Ownship, scripted_flight
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
 from dsa_des.time.randomness import target_keys
@@ -64,8 +64,8 @@ class RandomTraffic(TrafficSource):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         p = parameters
-        own = p.ownship.in_air(self.air)
-        self.own = flight_of(own, own.start, self.wind)
+        own = p.ownship.with_ellipsoid_heights(self.air)
+        self.own = scripted_flight(own, own.start, self.wind)
         names = tuple(f"intruder_{number}" for number in range(1, p.intruders + 1))
         keys = target_keys(names)
         stream = self.stream("start")
@@ -95,5 +95,5 @@ class RandomTraffic(TrafficSource):
         self.roster = Roster.from_pairs(list(zip(names, aircraft, strict=True)), (own.name, own))
 
     def sample_times(self) -> list[SampleTimes]:
-        """Return a regular grid over the run."""
+        """Return regular sample times over the whole run, at the interval that the scene states."""
         return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]

@@ -35,10 +35,10 @@ _RADIANS = ("latitude", 1.6, "longitude", 3.2)
 
 
 def describe_suspicions(aircraft: Sequence[SampledTrajectory]) -> list[str]:
-    """Return a sentence for each kind of suspicious motion in a file's flights."""
+    """Return a sentence per kind of implausible motion, with its aircraft and likely wrong unit."""
     by_hint: dict[str, list[str]] = {}
     for craft in aircraft:
-        for what, hint in _describe_aircraft(craft):
+        for what, hint in _implausible_motion(craft):
             by_hint.setdefault(hint, []).append(f"{craft.name}: {what}")
     return [f"{_list_few(cases)}; {hint}" for hint, cases in by_hint.items()]
 
@@ -48,8 +48,8 @@ def _list_few(cases: Sequence[str]) -> str:
     return cases[0] + more
 
 
-def _describe_aircraft(craft: SampledTrajectory) -> list[tuple[str, str]]:
-    """Return (what an aircraft does, what it looks like)."""
+def _implausible_motion(craft: SampledTrajectory) -> list[tuple[str, str]]:
+    """Return text pairs: what is implausible in a motion, and what may be wrong with the file."""
     oddities: list[tuple[str, str]] = []
     highest = float(np.max(craft.alt_m))
     if highest > HIGHEST_M:
@@ -72,7 +72,7 @@ def _describe_aircraft(craft: SampledTrajectory) -> list[tuple[str, str]]:
         oddities.append((f"it climbs or sinks at {climb:,.0f} m/s", hint))
     if fastest > FASTEST_MPS:
         what = f"its positions imply {fastest:,.0f} m/s"
-        oddities.append((what, _fast_hint(float(np.median(speed)))))
+        oddities.append((what, _hint_for_high_speed(float(np.median(speed)))))
     elif len(time_s) > 2:
         change = np.linalg.norm(np.diff(velocity, axis=1), axis=0)
         per_s2 = change / (0.5 * (time_s[2:] - time_s[:-2]))
@@ -89,7 +89,7 @@ def _describe_aircraft(craft: SampledTrajectory) -> list[tuple[str, str]]:
     return oddities
 
 
-def _fast_hint(typical_mps: float) -> str:
+def _hint_for_high_speed(typical_mps: float) -> str:
     if typical_mps <= FASTEST_MPS:
         return "are positions of two aircraft mixed, or single ones wrong?"
     return (
@@ -105,7 +105,7 @@ def _velocities(craft: SampledTrajectory) -> FloatArray:
 
 
 def _coverage(own: Trajectory, others: Sequence[SampledTrajectory], duration_s: float) -> list[str]:
-    """Return a sentence for each aircraft that is present for only a part of the run."""
+    """Return a warning if the ownship, or else others, are there for clearly less than the run."""
     lines = []
     first, last = own.interval_present()
     shared = max(0.0, min(last, duration_s) - max(first, 0.0))
@@ -131,8 +131,10 @@ def _coverage(own: Trajectory, others: Sequence[SampledTrajectory], duration_s: 
     return lines
 
 
-def derived_attitude(content: TrafficFile) -> dict[str, Any]:
-    """Return whose attitude was derived from the path, and how wrong that is known to be."""
+def derived_attitude_report(content: TrafficFile) -> dict[str, Any]:
+    """Return, for yaw, pitch and roll, the names of the aircraft whose angle was derived from the
+    path, and the median azimuth error if yaw is.
+    """
     names: dict[str, Any] = {}
     for angle in ("yaw", "pitch", "roll"):
         of = [craft.name for craft in content.aircraft if angle in craft.derived_attitude]
@@ -174,14 +176,14 @@ class RecordedTraffic(TrafficSource):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        self.content = self._in_air(self.read())
+        self.content = self._flights_in_scene_air(self.read())
         self.own = self.own_flight()
         others = [craft for craft in self.content.aircraft if craft is not self.own]
         self.targets = SampledFleet(others)
         self._sampled_s = [craft.sample_times_s for craft in others]
         self.roster = roster_of(
             self.own.name, [target.name for target in others], parameters.intruder,
-            parameters.aircraft, self.file_names(),
+            parameters.aircraft, self.files_text(),
         )  # fmt: skip
         if parameters.equipage_shares != EquipageShares():
             names, stream = self.roster.names, self.stream("equipage")
@@ -189,8 +191,8 @@ class RecordedTraffic(TrafficSource):
             own = self.roster.own_name, self.roster.own_aircraft[0]
             self.roster = Roster.from_pairs(list(zip(names, shared, strict=True)), own)
 
-    def _let_ownship_be(self, own: Ownship | None) -> None:
-        """Set the ownship's properties from the scene, where it gives any."""
+    def _set_ownship_properties(self, own: Ownship | None) -> None:
+        """Set the ownship's name and properties in the roster to the scene's, if any."""
         if own is not None:
             self.roster = replace(self.roster, own_name=own.name, own_aircraft=(own,))
 
@@ -198,12 +200,12 @@ class RecordedTraffic(TrafficSource):
         """Return the ownship's flight: the file's first aircraft, unless the scene says another."""
         return self.content.ownship
 
-    def file_names(self) -> str:
-        """Return the names of the files, for messages."""
+    def files_text(self) -> str:
+        """Return text that names the file in messages."""
         return str(self.p.file)
 
-    def _in_air(self, content: TrafficFile) -> TrafficFile:
-        """Return the flights as they are in the scene's air.
+    def _flights_in_scene_air(self, content: TrafficFile) -> TrafficFile:
+        """Return the flights, headings turned into the wind, heights above the ellipsoid.
 
         Noses are turned into its wind, and altitudes that are no heights are put at theirs.
         """
@@ -216,8 +218,8 @@ class RecordedTraffic(TrafficSource):
         )
         return replace(content, ownship=own, intruders=intruders)
 
-    def _says_heights(self) -> list[str]:
-        """Return a warning if a file has pressure altitudes and the air is not standard."""
+    def _pressure_altitude_warnings(self) -> list[str]:
+        """Return a warning if pressure altitudes are flown as heights in non-standard air."""
         is_pressure = re.search("baro|pressure", self.content.height, re.IGNORECASE)
         if self.air is None or not is_pressure or self.p.heights != "geometric":
             return []
@@ -229,11 +231,11 @@ class RecordedTraffic(TrafficSource):
         ]
 
     def read(self) -> TrafficFile:
-        """Return the content of the file."""
+        """Return the aircraft in the file."""
         raise TypeError(f"{type(self).__name__} reads no file")
 
     def natural_duration_s(self) -> Fraction:
-        """Return the time from the file's first sample to its last."""
+        """Return the duration that the file suggests, s: the time up to its last sample."""
         last = self.content.end_s
         if last is None:
             last = max(craft.interval_present()[1] for craft in self.content.aircraft)
@@ -241,7 +243,7 @@ class RecordedTraffic(TrafficSource):
         return max(Fraction(repr(float(last))), Fraction(1, 10**9))
 
     def sample_times(self) -> list[SampleTimes]:
-        """Return the sample times of the ownship where it has some, and those of each target.
+        """Return the file's sample times: the ownship's if recorded, and all targets'.
 
         They are the file's, also of who is steered.
         """
@@ -253,22 +255,22 @@ class RecordedTraffic(TrafficSource):
         return times
 
     def warnings(self) -> list[str]:
-        """Return warnings on rows left out, on impossible motion, and on the likely wrong unit."""
+        """Return warnings on skipped rows, pressure altitudes, implausible motion, absences."""
         duration_s = float(self.context.duration_s)
         lines = [
-            *self.content.warnings, *self._says_heights(),
+            *self.content.warnings, *self._pressure_altitude_warnings(),
             *describe_suspicions(self.content.aircraft),
             *_coverage(self.own, list(self.targets), duration_s),
         ]  # fmt: skip
-        return [f"file {self.file_names()}: {line}" for line in lines]
+        return [f"file {self.files_text()}: {line}" for line in lines]
 
     def report(self) -> dict[str, Any]:
-        """Return closest approaches, and the file's own clock at time 0."""
+        """Return closest approaches, clock time at time 0, notes and derived attitudes."""
         source: dict[str, Any] = {
             "start_time_s": self.content.start_time_s,
             "notes": self.content.notes,
         }
-        if derived := derived_attitude(self.content):
+        if derived := derived_attitude_report(self.content):
             source["derived_attitude"] = derived
         return {**super().report(), "traffic": source}
 

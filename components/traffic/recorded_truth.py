@@ -8,8 +8,8 @@ SMALL_S = 600.0
 _TABLE = "truth"
 
 
-def truth_is_recorded(context: Context, targets: int) -> bool:
-    """Return whether a scene records where all aircraft are.
+def is_truth_recorded(context: Context, targets: int) -> bool:
+    """Return whether true positions are recorded: as [record] says, or by default in small runs.
 
     Where tables are chosen, as a study chooses those that its metrics read, that one is among them
     or it is not made.

@@ -7,7 +7,7 @@ from typing import Any, Self, cast
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster, joint_roster
+from components.aircraft.aircraft import OWNSHIP, Aircraft, Roster, merge_replica_rosters
 from components.atmosphere.pressure_altitude import Air
 from components.flights.attitude import Wind, ground_speed_mps
 from components.flights.closest_approach import RegularTimes, SampleTimes
@@ -17,9 +17,9 @@ from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajector
 from components.geometry import enu_to_geodetic
 from components.traffic.flown_flights import FlightsOfRuns
 from components.traffic.heights import Heights
+from components.traffic.overhead_wires import NO_AREAS, OverheadWire
 from components.traffic.source import SourceParameters, TrafficSource
 from components.traffic.wind_effect import CrabAngles
-from components.traffic.wires import NO_AREAS, OverheadWire
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Parameters
 
@@ -67,8 +67,8 @@ class Flight(Heights):
             )
         return self
 
-    def in_air(self, air: Air | None) -> Self:
-        """Return the flight with heights above the ellipsoid for altitudes, in a scene's air."""
+    def with_ellipsoid_heights(self, air: Air | None) -> Self:
+        """Return a copy of the flight in the scene's air, its altitudes converted to heights."""
         if air is None or self.heights == "geometric":
             return self
 
@@ -88,7 +88,7 @@ class Flight(Heights):
 
 
 class Ownship(Flight, Aircraft):
-    """The ownship's start and flight, and what other platforms see of it."""
+    """Start, flight and properties of the ownship as written in a scene."""
 
     name: str = Field(default=OWNSHIP, min_length=1, description="Name by which others know it.")
     lat_deg: float = Field(ge=-90, le=90, description="Latitude at the start, deg.")
@@ -97,7 +97,7 @@ class Ownship(Flight, Aircraft):
 
     @property
     def start(self) -> Position:
-        """Latitude, longitude and altitude of the start."""
+        """Latitude (deg), longitude (deg) and altitude (m) of the start."""
         return self.lat_deg, self.lon_deg, self.alt_m
 
 
@@ -115,7 +115,7 @@ class Intruder(Flight, Aircraft):
 
 
 class Site(Parameters):
-    """A place on the ground that may carry blocks; nobody sees it."""
+    """A stationary place on the ground that may carry blocks and is invisible to sensors."""
 
     name: str = Field(min_length=1, description="Name.")
     lat_deg: float | None = Field(default=None, ge=-90, le=90, description="Latitude, deg.")
@@ -131,7 +131,7 @@ class Site(Parameters):
     roll_deg: float = Field(default=0.0, ge=-360, le=360, description="Turn about that axis, deg.")
 
     def to_intruder(self, own: Position, terrain: Any) -> "Intruder":
-        """Return the site as an aircraft that stands; offsets count from the ownship's start."""
+        """Return the site as a static intruder; offsets count from the ownship's start `own`."""
         place, offset = (self.lat_deg, self.lon_deg), (self.east_m, self.north_m)
         given, other = (offset, place) if place == (None, None) else (place, offset)
         if None in given or other != (None, None):
@@ -154,7 +154,7 @@ class Site(Parameters):
                 f"site {self.name!r}: its height must be given as alt_m, or as above_ground_m"
             )
         if self.above_ground_m is not None:
-            ground_m = None if terrain is None else terrain.ground_m(lat_deg, lon_deg)
+            ground_m = None if terrain is None else terrain.ground_height_m(lat_deg, lon_deg)
             if ground_m is None:
                 raise ValueError(
                     f"site {self.name!r}: above_ground_m is {self.above_ground_m:g} and [terrain] "
@@ -192,16 +192,18 @@ class ScriptedParameters(SourceParameters):
         description="Spacing of the samples at which closest approach is sought, s.",
     )
 
-    def in_air(self, air: Air | None) -> Self:
-        """Return the parameters with heights for all altitudes of flights, in a scene's air."""
+    def with_ellipsoid_heights(self, air: Air | None) -> Self:
+        """Return a copy in the scene's air: all flights' altitudes are above the ellipsoid."""
         if air is None:
             return self
-        flights = [one.in_air(air) for one in self.intruders]
-        return self.model_copy(update={"ownship": self.ownship.in_air(air), "intruders": flights})
+        flights = [one.with_ellipsoid_heights(air) for one in self.intruders]
+        return self.model_copy(
+            update={"ownship": self.ownship.with_ellipsoid_heights(air), "intruders": flights}
+        )
 
     def targets(self, terrain: Any) -> list[Intruder]:
-        """Return all that is there: intruders, the pieces of wires, and sites, which stand."""
-        pieces = [Intruder(**piece) for wire in self.wires for piece in wire.pieces()]
+        """Return all targets as intruders: intruders, pieces of wires, and sites (stationary)."""
+        pieces = [Intruder(**piece) for wire in self.wires for piece in wire.piece_intruders()]
         sites = [site.to_intruder(self.ownship.start, terrain) for site in self.sites]
         return self.intruders + pieces + sites
 
@@ -215,9 +217,9 @@ class ScriptedTraffic(TrafficSource):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        parameters = parameters.in_air(self.air)
+        parameters = parameters.with_ellipsoid_heights(self.air)
         own = parameters.ownship
-        self.own = flight_of(own, own.start, self.wind)
+        self.own = scripted_flight(own, own.start, self.wind)
         crafts = parameters.targets(self.context.sections.get("terrain"))
         self.unseen = tuple(range(len(crafts) - len(parameters.sites), len(crafts)))
         used: set[str] = set()
@@ -226,37 +228,40 @@ class ScriptedTraffic(TrafficSource):
                 key = f"intruders[{place}].name" if place < len(parameters.intruders) else "wires"
                 raise ValueError(f"{key}: the name {craft.name!r} is used more than once")
             used.add(craft.name)
-        self.targets = _intruders(crafts, own.start, self.wind)
+        self.targets = _intruder_fleet(crafts, own.start, self.wind)
         self.roster = Roster.from_pairs([(craft.name, craft) for craft in crafts], (own.name, own))
 
     def flights_of_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Any]
     ) -> FlightsOfRuns | None:
-        """Return the flights of runs; those that are all straight are prepared together."""
-        parameters = [p.in_air(self.air) for p in parameters]
+        """Return many runs' flights, computed together if all straight; None if rosters differ."""
+        parameters = [p.with_ellipsoid_heights(self.air) for p in parameters]
         own = [p.ownship for p in parameters]
         terrain = self.context.sections.get("terrain")
         crafts = [craft for p in parameters for craft in p.targets(terrain)]
         width = len(self.roster)
         if len(crafts) != width * len(own) or any(flight.legs for flight in (*own, *crafts)):
             return super().flights_of_runs(parameters, make)
-        roster = joint_roster(
+        roster = merge_replica_rosters(
             self.roster, *([(one.name, one) for one in of] for of in (crafts, own))
         )
         if roster is None:
             return None
         origins = np.array([flight.start for flight in own], dtype=np.float64)
         starts = _start_positions(crafts, np.repeat(origins, width, axis=0))
-        ownships, targets = _straight(own, origins, self.wind), _straight(crafts, starts, self.wind)
+        ownships, targets = (
+            _straight_fleet(own, origins, self.wind),
+            _straight_fleet(crafts, starts, self.wind),
+        )
         return FlightsOfRuns(ownships, targets, roster)
 
     def sample_times(self) -> list[SampleTimes]:
-        """Return a regular grid over the run."""
+        """Return regular sample times over the whole run, at the interval that the scene states."""
         return [RegularTimes(self.p.sample_interval_s, float(self.context.duration_s))]
 
 
-def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
-    """Return a flight's ground speed at its start, given or from its airspeed and the wind."""
+def initial_ground_speed_mps(flight: Flight, name: str, wind: Wind | None) -> float:
+    """Return a flight's initial ground speed, m/s: given, or from airspeed, heading and wind."""
     if flight.airspeed_mps is None:
         return flight.speed_mps
     if wind is None:
@@ -267,18 +272,18 @@ def over_the_ground_mps(flight: Flight, name: str, wind: Wind | None) -> float:
         raise ValueError(f"{name}: {error}") from None
 
 
-def flight_of(
+def scripted_flight(
     flight: Flight, start: Position, wind: Wind | None, reference: Position | None = None
 ) -> ScriptedTrajectory:
-    """Return the flight that a scene describes, from its start; see `ScriptedTrajectory`."""
+    """Return the trajectory of a scene's flight from `start` (latitude, longitude, height)."""
     lat_deg, lon_deg, alt_m = start
     return ScriptedTrajectory(
-        _name(flight),
+        _name_or_ownship(flight),
         lat_deg=lat_deg,
         lon_deg=lon_deg,
         alt_m=alt_m,
         heading_deg=flight.heading_deg,
-        speed_mps=over_the_ground_mps(flight, _name(flight), wind),
+        speed_mps=initial_ground_speed_mps(flight, _name_or_ownship(flight), wind),
         climb_mps=flight.climb_mps,
         yaw_deg=flight.yaw_deg,
         pitch_deg=flight.pitch_deg,
@@ -290,19 +295,23 @@ def flight_of(
     )
 
 
-def _intruders(crafts: Sequence[Intruder], reference: Position, wind: Wind | None) -> ScriptedFleet:
-    """Return the flights of all intruders."""
+def _intruder_fleet(
+    crafts: Sequence[Intruder], reference: Position, wind: Wind | None
+) -> ScriptedFleet:
+    """Return the flights of all intruders, whose offsets count from `reference`."""
     starts = _start_positions(crafts, np.tile(np.array(reference), (len(crafts), 1)))
     if not any(craft.legs for craft in crafts):
-        return _straight(crafts, starts, wind)
+        return _straight_fleet(crafts, starts, wind)
     return ScriptedFleet(
-        [flight_of(craft, tuple(at), wind, reference)
+        [scripted_flight(craft, tuple(at), wind, reference)
          for craft, at in zip(crafts, starts.tolist(), strict=True)]
     )  # fmt: skip
 
 
 def _start_positions(crafts: Sequence[Intruder], references: FloatArray) -> FloatArray:
-    """Return where intruders start (n, 3), offsets counted from a reference (n, 3) of each."""
+    """Return start latitudes, longitudes and heights (n, 3) of intruders, whose offsets count from
+    a reference position (n, 3) each.
+    """
     starts: FloatArray = np.zeros((len(crafts), 3))
     relative = np.zeros(len(crafts), dtype=bool)
     for number, craft in enumerate(crafts):
@@ -327,8 +336,10 @@ def _start_positions(crafts: Sequence[Intruder], references: FloatArray) -> Floa
     return starts
 
 
-def _straight(crafts: Sequence[Flight], starts: FloatArray, wind: Wind | None) -> ScriptedFleet:
-    """Return straight flights from start positions (n, 3)."""
+def _straight_fleet(
+    crafts: Sequence[Flight], starts: FloatArray, wind: Wind | None
+) -> ScriptedFleet:
+    """Return straight flights that begin at positions (n, 3: latitude, longitude, height)."""
     lat_deg, lon_deg, alt_m = starts.T.copy()
 
     def column(name: str, default: float = 0.0) -> FloatArray:
@@ -336,13 +347,15 @@ def _straight(crafts: Sequence[Flight], starts: FloatArray, wind: Wind | None) -
         return np.array([default if v is None else v for v in values], dtype=np.float64)
 
     return straight_fleet(
-        [_name(craft) for craft in crafts], lat_deg=lat_deg, lon_deg=lon_deg, alt_m=alt_m,
-        speed_mps=np.array([over_the_ground_mps(craft, _name(craft), wind) for craft in crafts]),
+        [_name_or_ownship(craft) for craft in crafts], lat_deg=lat_deg, lon_deg=lon_deg,
+        alt_m=alt_m,
+        speed_mps=np.array([initial_ground_speed_mps(craft, _name_or_ownship(craft),
+        wind) for craft in crafts]),
         **{name: column(name) for name in ("heading_deg", "climb_mps", "start_time_s")},
         end_time_s=column("end_time_s", np.inf),
         fixed_deg=np.stack([column(f"{angle}_deg", np.nan) for angle in ("yaw", "pitch", "roll")]),
     )  # fmt: skip
 
 
-def _name(flight: Flight) -> str:
+def _name_or_ownship(flight: Flight) -> str:
     return getattr(flight, "name", "ownship")

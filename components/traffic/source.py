@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 import numpy as np
 from pydantic import Field
 
-from components.aircraft.aircraft import Aircraft, Roster, joint_roster
+from components.aircraft.aircraft import Aircraft, Roster, merge_replica_rosters
 from components.aircraft.known_targets import KnownTraffic
 from components.atmosphere.pressure_altitude import Air, scene_air
 from components.flights.attitude import Wind, scene_wind
@@ -27,7 +27,7 @@ from components.flights.closest_approach import (
     RegularTimes,
     SampleTimes,
     approaches_of_run,
-    censored_approaches,
+    censoring_ends,
 )
 from components.flights.fleet import Fleet, Trajectory
 from components.flights.many_flights import SteeredFlight, fleet_of
@@ -37,17 +37,17 @@ from components.messages.reach import farthest_look
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_flights import FlightsOfRuns, FlownFlights, WithOthers
-from components.traffic.recorded_truth import truth_is_recorded
+from components.traffic.recorded_truth import is_truth_recorded
 from components.traffic.steering import (
     Coming,
+    add_due_manoeuvres,
     arrived_manoeuvres,
-    due_manoeuvres,
-    steer,
+    split_due_manoeuvres,
     steered_platforms,
 )
-from components.traffic.views import Seen, views_of
+from components.traffic.views import Seen, views_of_platforms
 from components.traffic.wind_effect import ATTITUDE
-from dsa_des.arrays.run_ticks import runs_of_single
+from dsa_des.arrays.run_ticks import single_run_numbers
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -66,7 +66,7 @@ class SourceParameters(Parameters):
 
 
 class TrafficSource(Component):
-    """Publishes where all aircraft are.
+    """Publishes the states of all aircraft; base class of all traffic blocks.
 
     Manoeuvres that are wired to it steer what carries the block that sends them, from the time they
     come. The ownship is the first of the platforms; what looks from another one sees that one in
@@ -102,7 +102,7 @@ class TrafficSource(Component):
     _offered: KnownTraffic | None = None
 
     def serves_replicas(self) -> bool:
-        """Return whether replicas share it: an ownship that is steered flies otherwise in each."""
+        """Return whether all replicas can share this block: so unless a block steers aircraft."""
         return super().serves_replicas() and not self.context.producers
 
     @property
@@ -112,7 +112,7 @@ class TrafficSource(Component):
 
     @property
     def air(self) -> Air | None:
-        """The scene's air, or None for the standard's."""
+        """The scene's atmosphere, or None for the standard one."""
         return scene_air(self.context.sections)
 
     @classmethod
@@ -126,10 +126,10 @@ class TrafficSource(Component):
         return self.roster.own_name, *self.roster.names
 
     def seen_from(self, platform: str = "") -> list[Any]:
-        """Return the flights, as known now, of a platform (by default the ownship) and then of all
-        that it may see, each by its `name`.
+        """Return the flight of a platform (by default the ownship), followed by the flights of all
+        aircraft that it may see, with manoeuvres so far.
         """
-        viewer = self._index(platform)
+        viewer = self._target_index(platform)
         others = {
             place: flight
             for place, flight in enumerate(self.targets)
@@ -142,7 +142,7 @@ class TrafficSource(Component):
         return [self.targets[viewer], *(of for _, of in sorted({**others, viewer: own}.items()))]
 
     def offer(self, port: str) -> KnownTraffic:
-        """Return the targets and where they can be, the same for all consumers.
+        """Return the target roster and a bound of positions, the same object for all consumers.
 
         Who went by where targets can be must show as replicas compare it.
         """
@@ -153,7 +153,7 @@ class TrafficSource(Component):
 
     def _envelope(self, reach_m: float, lasts_s: float, viewer: int) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s
-        flights = self._flights([viewer]).seen_from(viewer)
+        flights = self._flights_of_this_run([viewer]).seen_from(viewer)
         envelope = traffic_envelope(flights[0][0], flights[1], duration_s, reach_m)
         weather = self.context.sections.get("weather")
         if weather is not None and weather.wind_mps > 0.0:
@@ -162,7 +162,7 @@ class TrafficSource(Component):
         return envelope
 
     def apply_change(self, from_s: Fraction, other: Any) -> None:
-        """Carry from an instant on what another instance does; all else of aircraft stays."""
+        """Use another instance's roster properties from an instant on; flights stay as they are."""
         later = (*self.roster.later, (round(from_s * NANOSECONDS), other.roster))
         self.roster = replace(self.roster, later=later)
 
@@ -170,19 +170,21 @@ class TrafficSource(Component):
         """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
         self._check_terrain(self.own.at)
         #: Which platform each block steers.
-        self._steers = steered_platforms(self.context.producers, self._index, self.unseen)
+        self._steers = steered_platforms(self.context.producers, self._target_index, self.unseen)
         asked: dict[int, list[Any]] = {-1: []}
         for consumer in self.context.consumers:
-            asked.setdefault(self._index(consumer.platform), []).append(consumer.request)
+            asked.setdefault(self._target_index(consumer.platform), []).append(consumer.request)
         self._looks = {viewer: farthest_look(requests) for viewer, requests in asked.items()}
         #: Whether the truth is recorded.
-        self.says_truth = truth_is_recorded(self.context, len(self.roster))
-        self._fly(self._flights([*asked, *self._steers.values()]), self.roster, [self.p])
+        self.says_truth = is_truth_recorded(self.context, len(self.roster))
+        self._set_flights_of_runs(
+            self._flights_of_this_run([*asked, *self._steers.values()]), self.roster, [self.p]
+        )
         if self.context.producers:
             self.own = SteeredFlight(self.own, self._flown.fleet)
 
-    def _index(self, platform: str) -> int:
-        """Return which target a platform is; -1 for the ownship."""
+    def _target_index(self, platform: str) -> int:
+        """Return the index of a platform among the targets; -1 for the ownship."""
         names = self.roster.names
         if platform in ("", self.roster.own_name):
             return -1
@@ -193,24 +195,26 @@ class TrafficSource(Component):
             )
         return names.index(platform)
 
-    def _flights(self, platforms: Sequence[int]) -> FlownFlights:
-        """Return this run's own flights, with the ownship and targets as platforms."""
+    def _flights_of_this_run(self, platforms: Sequence[int]) -> FlownFlights:
+        """Return this run's flights of given platforms (indices of targets, -1 for the ownship)."""
         return FlownFlights.of(fleet_of([self.own]), self.targets, platforms)
 
-    def _fly(self, flights: FlownFlights, roster: Roster, parameters: Sequence[Any]) -> None:
-        """Store the flights of all runs from this one on, and how they are published."""
+    def _set_flights_of_runs(
+        self, flights: FlownFlights, roster: Roster, parameters: Sequence[Any]
+    ) -> None:
+        """Set all served runs' flights and roster; reset views and pending manoeuvres."""
         self.roster = roster
         rates = [p.update_rate_hz for p in parameters]
         rates_hz = None if None in rates else np.array(rates, dtype=np.float64)
         #: Manoeuvres that have come, and are not flown by any row yet.
-        self._pending = Coming.none()
+        self._pending = Coming.empty_table()
         #: The targets that were moved last, and their fleet.
         self._moved: tuple[IntArray, Fleet] = np.arange(len(roster)), flights.targets
         culls = not self.context.simulate_everything and self.clock_of(self.p) is None
         steer = sorted(self._steers.values()) if self.context.producers else None
         duration_s = float(self.context.duration_s)
         #: What each platform may look at, the ownship's first.
-        self._views = views_of(flights, self._looks, culls, duration_s, steer)
+        self._views = views_of_platforms(flights, self._looks, culls, duration_s, steer)
         self._flown = replace(
             flights,
             crabbing=self.built(ATTITUDE),
@@ -220,7 +224,7 @@ class TrafficSource(Component):
         )
 
     def _check_terrain(self, own_at: FlightAt) -> None:
-        """Refuse terrain that an ownship does not fly above."""
+        """Raise an error if the ownship flies below the terrain or over unknown heights."""
         terrain, end_s = self.context.sections.get("terrain"), float(self.context.duration_s)
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(own_at, terrain.height_m, end_s)
@@ -229,14 +233,14 @@ class TrafficSource(Component):
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
-        """Do what can be done at once for blocks with these parameters, which will be made."""
+        """Do work in advance, once for all blocks made with these parameters; here none."""
 
     def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Component]
     ) -> "TrafficSource | None":
-        """Return what flies the flights of all runs."""
+        """Return one block that flies all runs' flights; None if each run needs its own block."""
         # Where the line of sight was chosen by where the traffic is, each replica chooses.
-        if self._offered is not None and self._offered.was_asked:
+        if self._offered is not None and self._offered.is_envelope_used:
             return None
         self.prepare(parameters)
         flights = self.flights_of_runs(parameters, make)
@@ -251,13 +255,13 @@ class TrafficSource(Component):
             self._check_terrain(partial(_states_of_one, flights.own, number))
         of_all = copy(self)
         flown = FlownFlights.of(flights.own, flights.targets, self._flown.platforms)
-        of_all._fly(flown, flights.roster, parameters)
+        of_all._set_flights_of_runs(flown, flights.roster, parameters)
         return of_all
 
     def flights_of_runs(
         self, parameters: Sequence[Any], make: Callable[[int], Any]
     ) -> FlightsOfRuns | None:
-        """Return the flights of runs with these parameters; None where their rosters do not fit."""
+        """Return the flights of the runs with these parameters, or None if their rosters differ."""
         own, targets = [], []
         aircraft: list[tuple[str, Aircraft]] = []
         looking: list[tuple[str, Aircraft]] = []
@@ -266,30 +270,34 @@ class TrafficSource(Component):
             targets += list(source.targets)
             aircraft += zip(source.roster.names, source.roster.aircraft, strict=True)
             looking.append((source.roster.own_name, source.roster.own_aircraft[0]))
-        roster = joint_roster(self.roster, aircraft, looking)
+        roster = merge_replica_rosters(self.roster, aircraft, looking)
         return None if roster is None else FlightsOfRuns(fleet_of(own), fleet_of(targets), roster)
 
     @property
     def width(self) -> int:
-        """Most targets that are moved at one time."""
+        """Largest number of targets that are moved at one time."""
         most = sum(view.most_at_once for view in self._views) + len(self._views) - 1
         return min(most, len(self.roster))
 
     def skipped_work_notes(self) -> list[str]:
-        """Return a sentence on the range beyond which targets are left out."""
-        return [view.culling_note(self.roster.names) for view in self._views if view.culls]
+        """Return a sentence per platform that omits far targets, with the range of omission."""
+        return [
+            view.culling_note(self.roster.names)
+            for view in self._views
+            if view.may_leave_out_targets
+        ]
 
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
-        run = wake.run if self._flown.runs > 1 else runs_of_single(len(wake))
+        run = wake.run if self._flown.runs > 1 else single_run_numbers(len(wake))
         time_s = wake.time_s
-        known = self._steer(wake, run)
+        known = self._apply_manoeuvres(wake, run)
         flown = self._flown
         seen = Seen(self._views, flown, run, time_s)
         states = self._targets_at(run, seen.columns, time_s)
-        present, culled = seen.present_for_ownship(states.present)
-        others = seen.present_for_others(states.present, self.roster.names)
+        present, culled = seen.visible_to_ownship(states.present)
+        others = seen.visible_to_other_platforms(states.present, self.roster.names)
         truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
         asked = any(look.lasts_s > 0.0 for look in self._looks.values())
         return TrafficStates.of(
@@ -307,15 +315,17 @@ class TrafficSource(Component):
             run_time_s=None if truth is None else time_s,
         )
 
-    def _steer(self, wake: Wake, run: IntArray) -> IntArray:
-        """Steer platforms by the manoeuvres that came; return the number known to each row."""
+    def _apply_manoeuvres(self, wake: Wake, run: IntArray) -> IntArray:
+        """Add the manoeuvres received to the flights of their platforms; return how many each
+        platform has flown by each row (rows, platforms).
+        """
         self._pending = Coming.concatenate([self._pending, *arrived_manoeuvres(wake, self._steers)])
         flown = self._flown
         fleet, runs = flown.fleet, flown.runs
         each = run[:, np.newaxis] + runs * np.arange(len(flown.platforms))
         if not len(self._pending):
             return fleet.manoeuvre_count[each]
-        due, self._pending = due_manoeuvres(wake, self._pending)
+        due, self._pending = split_due_manoeuvres(wake, self._pending)
         flights = np.searchsorted(flown.platforms, due.platform) * runs + due.replica
         time_s = due.tick / wake.ticks_per_s
         there = due.platform < 0
@@ -323,7 +333,7 @@ class TrafficSource(Component):
             from_s, until_s = fleet.nominal.intervals_present_s[flights].T
             there |= (from_s <= time_s) & (time_s <= until_s)
             due, flights = due.take(there), flights[there]
-        fleet, known = steer(fleet, flights, due, wake, each)
+        fleet, known = add_due_manoeuvres(fleet, flights, due, wake, each)
         for view in self._views:
             if view.epochs is not None:
                 mine = due.take(due.platform == view.viewer)
@@ -336,7 +346,7 @@ class TrafficSource(Component):
         return known
 
     def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
-        """Return the states (rows, columns) of targets of each row's run."""
+        """Return states (rows, columns) of the targets `columns`, for each row's run and time."""
         flown, shape = self._flown, (len(time_s), len(columns))
         state: TrajectoryState | None = None
         if flown.runs == 1:
@@ -346,43 +356,46 @@ class TrafficSource(Component):
             if not flown.crabbing and not flown.steered_targets:
                 return state
             state = state.reshape((-1,))
-        each = (run[:, np.newaxis] * flown.width + columns).reshape(-1)
+        each = (run[:, np.newaxis] * flown.targets_per_run + columns).reshape(-1)
         return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshape(shape)
 
     def own_at(self, time_s: FloatArray) -> TrajectoryState:
-        """Return the ownship's state, as it is known now, at times (n,), in wind."""
+        """Return the ownship's states in run 0 at times (n,), with manoeuvres so far and wind."""
         return self._flown.platform_at(-1, np.zeros(len(time_s), dtype=np.int64), time_s)
 
     def records(self) -> list[type[Message]]:
-        """Return the recorded message types: the truth where a scene is small, or has that set."""
+        """Return the types to record: traffic states; true ones if asked or the scene is small."""
         return [TrafficStates, TrueStates] if self.says_truth else [TrafficStates]
 
     def sample_times(self) -> list[SampleTimes]:
-        """Return the times at which the source itself knows ownship and targets.
+        """Return the times at which the flights are given by samples, for ownship and targets.
 
         A target's times are those of all the items together.
         """
         raise TypeError(f"{type(self).__name__} does not say when its samples are")
 
     def report(self) -> dict[str, Any]:
-        """Return the closest approach of every target over the run."""
-        return {"targets": self.approaches()}
+        """Return the closest approach of every target to the ownship over the run."""
+        return {"targets": self.closest_approaches()}
 
-    def approaches(self, platform: str = "") -> dict[str, Any]:
-        """Return the closest approach over the run of everybody whom a platform may see, by name.
+    def closest_approaches(self, platform: str = "") -> dict[str, Any]:
+        """Return the time and range of the closest approach of each aircraft that a platform (by
+        default the ownship) may see, by name.
 
         By default that is the ownship. ``at`` says where it is the first or the last instant that
         was looked at: the aircraft may have been nearer before, or come nearer after.
         """
-        end_s, viewer = float(self.context.duration_s), self._index(platform)
+        end_s, viewer = float(self.context.duration_s), self._target_index(platform)
         own, targets, names = self.own, self.targets, [*self.roster.names]
         if viewer >= 0:  # it and the ownship change places
             own, names[viewer] = targets[viewer], self.roster.own_name
-            targets = WithOthers(targets, len(targets), {viewer: self._flown.of_platform(-1)})
-        times = self._compared_at(end_s)
-        between = not self._seeks_at_samples
+            targets = WithOthers(
+                targets, len(targets), {viewer: self._flown.flights_of_platform(-1)}
+            )
+        times = self._approach_search_times(end_s)
+        between = not self._has_sample_interval
         best = approaches_of_run(own, targets, times, end_s, between=between)
-        where = censored_approaches(own, targets, times, best.time_s, end_s)
+        where = censoring_ends(own, targets, times, best.time_s, end_s)
         closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         approaches = [
             (name, {"time_s": time_s, "range_m": range_m, **({"at": at} if at else {})})
@@ -395,16 +408,16 @@ class TrafficSource(Component):
         }
 
     @property
-    def _seeks_at_samples(self) -> bool:
-        """Return whether the scene sets the spacing at which closest approaches are sought."""
+    def _has_sample_interval(self) -> bool:
+        """Return whether the scene sets the interval at which closest approaches are searched."""
         return hasattr(self.p, "sample_interval_s")
 
-    def _compared_at(self, end_s: float) -> list[SampleTimes]:
-        """Return the times at which distances are compared; a file's may be minutes apart."""
-        grid = [] if self._seeks_at_samples else [RegularTimes(STEP_S, end_s)]
+    def _approach_search_times(self, end_s: float) -> list[SampleTimes]:
+        """Return the sets of times at which the closest-approach search compares distances."""
+        grid = [] if self._has_sample_interval else [RegularTimes(STEP_S, end_s)]
         return [*self.sample_times(), *grid]
 
 
 def _states_of_one(fleet: Fleet, aircraft: int, time_s: FloatArray) -> TrajectoryState:
-    """Return the states of one flight of many at times (n,)."""
+    """Return the states of one flight of a fleet at times (n,)."""
     return fleet.each(np.full(len(time_s), aircraft), time_s)

@@ -8,8 +8,8 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet
 from components.messages.steering import Manoeuvre
-from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
-from dsa_des.arrays.run_ticks import RunTicks, next_position_in_run
+from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
+from dsa_des.arrays.run_ticks import RunTicks, first_position_at_or_after
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Producer
 from dsa_des.block.wake import Wake
@@ -19,7 +19,9 @@ from dsa_des.time.clock import MAX_TICK
 def steered_platforms(
     producers: Sequence[Producer], index: Callable[[str], int], unseen: Collection[int]
 ) -> dict[str, int]:
-    """Return which platform each block steers; one that two steer is refused."""
+    """Return, by name of the steering block, the index of the platform that it steers; ValueError
+    if two blocks steer one platform.
+    """
     steering: dict[int, str] = {}
     for producer in producers:
         platform = index(producer.platform)
@@ -40,60 +42,59 @@ def steered_platforms(
 
 
 class Coming(KeyedTable):
-    """Manoeuvres that have come: in which run (`replica`), at which `tick`, for which `platform`,
-    and what they are (`manoeuvre`, (fields of `Manoeuvre`, n)).
-    """
+    """Table of received manoeuvres still to be flown: run, tick, platform and manoeuvre."""
 
     @classmethod
-    def none(cls) -> Coming:
-        """Return none."""
+    def empty_table(cls) -> Coming:
+        """Return a table with no manoeuvre."""
         types = {"replica": int, "tick": int, "platform": int, "manoeuvre": float}
         return cls.empty(types, {"manoeuvre": (len(Manoeuvre._fields),)})
 
     @property
     def instants(self) -> RunTicks:
-        """When each came."""
+        """Run and tick at which each manoeuvre was received."""
         return RunTicks(self.replica, self.tick)
 
 
 def arrived_manoeuvres(wake: Wake, steers: Mapping[str, int]) -> list[Coming]:
-    """Return the manoeuvres that have come since the last wake; blocks steer which platform."""
+    """Return tables of manoeuvres since the last wake; `steers` maps blocks to platforms."""
     return [
         Coming(
             replica=np.array(new.message.run),
             tick=new.tick,
             platform=np.full(len(new.tick), steers[new.source]),
-            manoeuvre=new.message.manoeuvres().T,
+            manoeuvre=new.message.manoeuvre_array().T,
         )
         for new in wake.arrivals("manoeuvres")
     ]
 
 
-def due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
-    """Part what has come into what rows of this wake fly, and what is for later ones.
+def split_due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
+    """Return two tables: manoeuvres that rows of this wake fly, and those only of later rows.
 
     What comes after the last row is for the next wake: what is flown at the end of a run must not
     depend on how far a window reached beyond it.
     """
     pending = pending.take(np.lexsort((pending.platform, pending.tick, pending.replica)))
     came = pending.instants
-    row = next_position_in_run(
+    row = first_position_at_or_after(
         wake.instants, came
     )  # the first that flies it, if it is of its ownship
     due = (row < len(wake)) & (wake.run[np.minimum(row, len(wake) - 1)] == came.run)
     return pending.take(due), pending.take(~due)
 
 
-def steer(
+def add_due_manoeuvres(
     fleet: SteeredFleet, flights: IntArray, due: Coming, wake: Wake, each: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
-    """Return a fleet whose `flights` fly what has come, and how many manoeuvres each row knows.
+    """Return the fleet with the due manoeuvres added to `flights`, and the number of manoeuvres
+    known at each row (rows, platforms).
 
     `each` (rows, platforms) are the flights that a row speaks of. It knows the manoeuvres that have
     come by its own instant, whatever came later in this wake.
     """
     known: IntArray = fleet.manoeuvre_count[each]
-    for one in occurrences_by_turn(flights):  # the first of every flight, then the next
+    for one in indices_by_occurrence(flights):  # the first of every flight, then the next
         ticks = due.tick[one]
         fleet = fleet.add_manoeuvres(
             flights[one], ticks / wake.ticks_per_s, due.manoeuvre[:, one].T

@@ -14,7 +14,7 @@ from dsa_des.block.effect import Effect, Hook, Verdict
 
 
 class Crabbing:
-    """Turns attitudes that follow from paths over the ground into those in wind."""
+    """Turns attitudes derived from ground paths into those that aircraft have in wind."""
 
     def __init__(self, wind: Wind) -> None:
         self._wind = wind
@@ -57,13 +57,13 @@ class CrabAngles(Effect[Crabbing]):
     outside_the_proof = "angles are formed anew, and their last bits differ"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether wind turns aircraft off their track: needs ``[weather] wind_mps``."""
+        """Return whether wind acts on attitudes, and why: ``[weather] wind_mps`` above 0."""
         weather = block.context.sections.get("weather")
         wind_mps = 0.0 if weather is None else weather.wind_mps
         return Verdict(wind_mps > 0.0, f"[weather] wind_mps is {wind_mps:g}")
 
     def build(self, block: Any) -> Crabbing:
-        """Return a function that turns the noses into the wind."""
+        """Return a function turning headings into the wind so that ground tracks stay the same."""
         wind = scene_wind(block.context.sections["weather"])
         assert wind is not None
         return Crabbing(wind)

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 
-from components.display.recorded_run import suggest_scene
+from components.display.recorded_run import scene_hint
 from components.view.page import RunPicture, page_of_several, page_text
 from components.view.run_picture import encounter_picture, run_picture
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_file import check_file_writable, write_file
 from dsa_des.files.output_names import user_path
 from dsa_des.terminal.terminal import say
 
@@ -17,10 +17,10 @@ _MOST = 3
 
 
 def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> None:
-    """Write the page of runs' folders or of ``.daa`` files; ``dsa-des view``."""
+    """Write an HTML page showing run folders or ``.daa`` files; the command ``dsa-des view``."""
     if len(runs) > _MOST:
         raise UsageError(f"{len(runs)} runs: at most {_MOST} stand beside each other")
-    pictures = [_picture(Path(run), platform) for run in runs]
+    pictures = [_picture_of_source(Path(run), platform) for run in runs]
     if len(pictures) == 1:
         page = page_text(pictures[0])
     else:
@@ -30,7 +30,7 @@ def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> N
                 picture.title = f"{name}: {picture.title}"
         page = page_of_several(pictures)
     target = _default_page_path(runs) if out is None else user_path(out)
-    check_file(target)
+    check_file_writable(target)
     try:
         write_file(target, page.encode("utf-8"))
     except OSError as error:
@@ -39,13 +39,13 @@ def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> N
 
 
 def _default_page_path(runs: tuple[str, ...]) -> Path:
-    """Return where the page goes by itself: beside the first run, with the names of all."""
+    """Return the default path of the page: beside the first run, named after all runs."""
     paths = [Path(run) if Path(run).is_file() else Path(run).resolve() for run in runs]
     names = [path.stem if path.is_file() else path.name for path in paths]
     return paths[0].with_name(f"{'-'.join(names)}.html")
 
 
-def _picture(source: Path, platform: str | None) -> RunPicture:
+def _picture_of_source(source: Path, platform: str | None) -> RunPicture:
     if source.is_dir():
         try:
             with np.errstate(invalid="ignore", over="ignore"):
@@ -61,4 +61,4 @@ def _picture(source: Path, platform: str | None) -> RunPicture:
         return encounter_picture(source)
     if source.exists():
         raise UsageError(f"{source}: is neither a run's folder nor a .daa file")
-    raise UsageError(f"{source}: there is no such folder or file{suggest_scene(str(source))}")
+    raise UsageError(f"{source}: there is no such folder or file{scene_hint(str(source))}")

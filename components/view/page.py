@@ -47,17 +47,17 @@ class RunPicture:
     eyes: "dict[str, RunPicture]" = field(default_factory=dict)
 
     def to_json_tables(self) -> dict[str, Any]:
-        """Return the picture for JSON; columns are little-endian numbers in base 64."""
-        tables = {name: _pack(table) for name, table in self.tables.items()}
+        """Return a dictionary for JSON, with each column as little-endian numbers in base 64."""
+        tables = {name: _encode_columns(table) for name, table in self.tables.items()}
         eyes = {name: picture.to_json_tables() for name, picture in self.eyes.items()}
         return {**vars(self), "tables": tables, "eyes": eyes}
 
 
-def _pack(table: Mapping[str, AnyArray]) -> dict[str, Any]:
-    return {name: _column(name, values) for name, values in table.items()}
+def _encode_columns(table: Mapping[str, AnyArray]) -> dict[str, Any]:
+    return {name: _encode_column(name, values) for name, values in table.items()}
 
 
-def _column(name: str, values: AnyArray) -> dict[str, str]:
+def _encode_column(name: str, values: AnyArray) -> dict[str, str]:
     if values.dtype.kind in "iub":
         kind, stored = "i4", values.astype(_INDEX)
     elif name.endswith("_s"):  # instants are compared with each other
@@ -68,46 +68,46 @@ def _column(name: str, values: AnyArray) -> dict[str, str]:
 
 
 def page_text(picture: RunPicture) -> str:
-    """Return the page of a picture.
+    """Return the HTML page that shows a run.
 
     Its content security policy lets the browser run the one program inside and fetch nothing. Text
     of the run can carry no markup: it stands in JSON without angle brackets, and the program puts
     it on screen as text.
     """
-    script, digest = page_program(_PACKAGE, SCRIPTS)
+    script, digest = page_script_and_digest(_PACKAGE, SCRIPTS)
     contents = {
-        "policy": _policy(digest),
+        "policy": _content_security_policy(digest),
         "title": escape(printable(picture.title)),
-        "style": page_part(_PACKAGE, "style.css"),
+        "style": read_page_file(_PACKAGE, "style.css"),
         "data": _json(picture.to_json_tables()),
         "script": script,
     }
-    return fill_page(_PACKAGE, "view.html", contents)
+    return fill_page_template(_PACKAGE, "view.html", contents)
 
 
 def page_of_several(pictures: Sequence[RunPicture]) -> str:
-    """Return one page with those of several pictures beside each other, on one clock.
+    """Return one HTML page that shows several runs side by side on one clock.
 
     Each stands in a frame of its own, as text of this page: nothing is fetched for it either.
     """
-    script = page_part(_PACKAGE, "beside.js")
-    _, inner = page_program(_PACKAGE, SCRIPTS)
+    script = read_page_file(_PACKAGE, "beside.js")
+    _, inner = page_script_and_digest(_PACKAGE, SCRIPTS)
     frames = [
         f'<iframe title="{escape(printable(one.title), quote=True)}" '
         f'srcdoc="{escape(page_text(one), quote=True)}"></iframe>'
         for one in pictures
     ]
     contents = {
-        "policy": _policy(_digest(script), inner),
+        "policy": _content_security_policy(_digest(script), inner),
         "title": escape(printable(" | ".join(one.title for one in pictures))),
         "frames": "\n".join(frames),
         "script": script,
     }
-    return fill_page(_PACKAGE, "beside.html", contents)
+    return fill_page_template(_PACKAGE, "beside.html", contents)
 
 
-def _policy(*digests: str) -> str:
-    """Return a policy that lets the browser run programs of these digests and fetch nothing."""
+def _content_security_policy(*digests: str) -> str:
+    """Return a policy (CSP) to run only scripts with these SHA-256 digests and fetch nothing."""
     programs = " ".join(f"'sha256-{digest}'" for digest in digests)
     return escape(
         f"default-src 'none'; script-src {programs}; style-src 'unsafe-inline'; "
@@ -121,19 +121,19 @@ def _json(content: dict[str, Any]) -> str:
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
-def page_part(package: str, name: str) -> str:
-    """Return a file of a package's folder ``page``."""
+def read_page_file(package: str, name: str) -> str:
+    """Return the text of a file in the folder ``page`` of a package."""
     return (files(package) / "page" / name).read_text(encoding="utf-8")
 
 
-def page_program(package: str, scripts: Iterable[str]) -> tuple[str, str]:
-    """Return the scripts of a page as one, after what all pages draw with, and its SHA-256.
+def page_script_and_digest(package: str, scripts: Iterable[str]) -> tuple[str, str]:
+    """Return the page's scripts joined after the shared ones, and their SHA-256 in base 64.
 
     Scripts stand in the order in which they need each other; the digest is in base 64, as a content
     security policy has it.
     """
-    parts = [page_part("components.view", name) for name in ("canvas.js", "labels.js")]
-    parts += [page_part(package, name) for name in scripts]
+    parts = [read_page_file("components.view", name) for name in ("canvas.js", "labels.js")]
+    parts += [read_page_file(package, name) for name in scripts]
     script = "\n".join(parts)
     return script, _digest(script)
 
@@ -142,9 +142,9 @@ def _digest(script: str) -> str:
     return base64.b64encode(hashlib.sha256(script.encode("utf-8")).digest()).decode("ascii")
 
 
-def fill_page(package: str, name: str, contents: Mapping[str, str]) -> str:
-    """Return a page with contents in the places of its ``{{marks}}``.
+def fill_page_template(package: str, name: str, contents: Mapping[str, str]) -> str:
+    """Return a package's page template with each ``{{mark}}`` replaced by its content.
 
     In one pass: what is put in may hold such marks itself.
     """
-    return re.sub(r"\{\{(\w+)\}\}", lambda mark: contents[mark[1]], page_part(package, name))
+    return re.sub(r"\{\{(\w+)\}\}", lambda mark: contents[mark[1]], read_page_file(package, name))

@@ -8,9 +8,14 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture import LINE, TangentPlane, offset_positions, sights
+from components.display.picture_plane import (
+    LINE,
+    TangentPlane,
+    bearings_and_end_points,
+    offset_positions,
+)
 from components.display.recorded_run import POSE, RecordedTables, read_table
-from components.display.symbols import block_marks, in_colours, platform_colours
+from components.display.symbols import block_marks, platform_colours, recolour_by_platform
 from components.formats.daa_file import read_daa_samples
 from components.formats.text_rows import TrafficFileError
 from components.messages.alerts import BAND_REGIONS
@@ -30,7 +35,7 @@ _LEVELS = tuple(f"time_to_level_{level}_s" for level in (1, 2, 3, 4))
 
 
 def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
-    """Return the page's picture of a run; `UsageError` where the folder holds none.
+    """Return what the page shows of a run (all or one platform); UsageError if no run is there.
 
     It is what all platforms have, with what each of several has as seen from there, or what one
     has.
@@ -46,8 +51,8 @@ def run_picture(folder: Path, platform: str | None = None) -> RunPicture:
     )
     if platform is not None:
         return _picture_of(run, info, platform)
-    whole, plane = _picture_of(run, info), _plane_of(_Poses(run, run.own_name))
-    each = dict.fromkeys(run.carrying.values())
+    whole, plane = _picture_of(run, info), _plane_at_start(_Poses(run, run.own_name))
+    each = dict.fromkeys(run.platform_by_block.values())
     whole.eyes = {on: _picture_of(run, info, on, plane) for on in each}
     return whole
 
@@ -58,36 +63,39 @@ def _picture_of(
     platform: str | None = None,
     plane: TangentPlane | None = None,
 ) -> RunPicture:
-    """Return the picture of a run, or of what a platform has of it, in the plane at its start."""
-    folder, carrying, first = run.folder, run.carrying, platform or run.own_name
+    """Return what the page shows of a run or one platform, in a plane tangent at the start."""
+    folder, carrying, first = run.folder, run.platform_by_block, platform or run.own_name
     if platform is not None:
         run = run.seen_from(platform)
     known = ("truth", "detections", "alerts")
-    names = sorted({text for table in known for text in _texts(run, table, "target")})
+    names = sorted({text for table in known for text in _distinct_texts(run, table, "target")})
     targets = {name: number for number, name in enumerate(names)}
     poses = _Poses(run, first)
     own_s, own = poses.of(None)
-    plane = plane or _plane_of(poses)
-    sensors = sorted(_texts(run, "scans", "block") | _texts(run, "detections", "block"))
+    plane = plane or _plane_at_start(poses)
+    sensors = sorted(
+        _distinct_texts(run, "scans", "block") | _distinct_texts(run, "detections", "block")
+    )
     colours = platform_colours(carrying.values())
-    marks = in_colours(block_marks(run.block_types(sensors)), carrying, colours)
+    marks = recolour_by_platform(block_marks(run.block_types(sensors)), carrying, colours)
     blocks = run.scene.get("blocks", {})
     picture = RunPicture(
         title=str(run.scene.get("title") or folder.name),
         facts=_run_facts(info, run.scene) | ({} if platform is None else {"seen from": platform}),
         duration_s=float(info["duration_s"]),
         sensors=[
-            _sensor(name, blocks.get(name, {}), marks[name], carrying.get(name)) for name in sensors
+            _sensor_entry(name, blocks.get(name, {}), marks[name], carrying.get(name))
+            for name in sensors
         ],
         targets=names,
     )
 
     def plain(table: str, *columns: str) -> dict[str, AnyArray]:
-        return {name: run.values(table, name) for name in columns if run.has(table, name)}
+        return {name: run.values(table, name) for name in columns if run.has_columns(table, name)}
 
     def base_columns(table: str) -> dict[str, AnyArray]:
-        result = {"target": _codes(run.texts(table, "target"), targets)}
-        return result | _sources(run, table)
+        result = {"target": _index_of_names(run.texts(table, "target"), targets)}
+        return result | _source_columns(run, table)
 
     tables = picture.tables
     tables["own"] = _ownship_columns(own_s, own, plane)
@@ -95,18 +103,18 @@ def _picture_of(
         tables["truth"] = _truth(run, plane, targets)
     tables["scans"] = {
         "time_s": run.numbers("scans", "time_s"),
-        "sensor": _codes(run.texts("scans", "block"), sensors),
+        "sensor": _index_of_names(run.texts("scans", "block"), sensors),
         "detected": run.values("scans", "detected"),
     }
     tables["detections"] = {
         "time_s": run.numbers("detections", "time_s"),
-        "sensor": _codes(run.texts("detections", "block"), sensors),
-        "target": _codes(run.texts("detections", "target"), targets),
+        "sensor": _index_of_names(run.texts("detections", "block"), sensors),
+        "target": _index_of_names(run.texts("detections", "target"), targets),
         "scan": run.values("detections", "scan"),
         **_lines_of_sight(run, "detections", run.stack_columns("detections", POSE), plane),
     }
     for name in ("fused", "tracks"):
-        if run.has(name, "azimuth_rad"):
+        if run.has_columns(name, "azimuth_rad"):
             time_s = run.numbers(name, "time_s")
             tables[name] = {
                 **base_columns(name),
@@ -115,32 +123,34 @@ def _picture_of(
                 **_lines_of_sight(run, name, poses.at(name, time_s), plane),
             }
     if "tracks" in tables:
-        picture.trackers = _blocks(run, "tracks")
+        picture.trackers = _block_names(run, "tracks")
     if "state_tracks" in run.tables:
-        picture.trackers = _blocks(run, "state_tracks")
+        picture.trackers = _block_names(run, "state_tracks")
         tables["tracks"] = _estimates(run, picture.trackers, poses, plane)
     if "alerts" in run.tables:
         tables["alerts"] = {
             **base_columns("alerts"), "time_s": run.numbers("alerts", "time_s"),
             "level": run.values("alerts", "level"), **plain("alerts", *_LEVELS),
         }  # fmt: skip
-        if run.has("alerts", "track"):
+        if run.has_columns("alerts", "track"):
             tables["alerts"]["track"] = _track_numbers_of(run.values("alerts", "track"))
     if "manoeuvres" in run.tables:
         tables["manoeuvres"] = plain("manoeuvres", "time_s", "turn_rad", "climb_m")
     if "bands" in run.tables:
         columns = ("time_s", "low_rad", "high_rad", "low_m", "high_m")
-        on = run.texts("bands", "platform") if run.has("bands", "platform") else [first]
+        on = run.texts("bands", "platform") if run.has_columns("bands", "platform") else [first]
         # They are drawn around who looks, so that those of others are left out.
         mine = np.array([one == first for one in on], dtype=bool)
         rows = np.flatnonzero(np.broadcast_to(mine, run.tables["bands"].num_rows))
         tables["bands"] = {name: run.numbers("bands", name)[rows] for name in columns}
         # Directions of bands are from the north of where the ownship then was.
-        pose = _pose_at(own_s, own, tables["bands"]["time_s"])
-        turned = np.nan_to_num(plane.turned_rad(pose))
+        pose = _latest_pose_at(own_s, own, tables["bands"]["time_s"])
+        turned = np.nan_to_num(plane.north_direction_rad(pose))
         for name in ("low_rad", "high_rad"):
             tables["bands"][name] = tables["bands"][name] + turned
-        tables["bands"]["region"] = _codes(run.texts("bands", "region"), BAND_REGIONS)[rows]
+        tables["bands"]["region"] = _index_of_names(run.texts("bands", "region"), BAND_REGIONS)[
+            rows
+        ]
     return picture
 
 
@@ -154,32 +164,32 @@ def _json(path: Path) -> dict[str, Any]:
     return result
 
 
-def _texts(run: RecordedTables, table: str, name: str) -> set[str]:
-    """Return the texts of a column, none where there is no such column."""
-    texts = run.texts(table, name) if run.has(table, name) else []
+def _distinct_texts(run: RecordedTables, table: str, name: str) -> set[str]:
+    """Return the distinct texts in a column of a table; empty if there is no such column."""
+    texts = run.texts(table, name) if run.has_columns(table, name) else []
     return {text for text in texts if text is not None}
 
 
-def _blocks(run: RecordedTables, table: str) -> list[str]:
-    """Return the names of the blocks of a table, in the order of their numbers on the page."""
-    return sorted(_texts(run, table, "block"))
+def _block_names(run: RecordedTables, table: str) -> list[str]:
+    """Return the names of a table's blocks, sorted; the page uses their index as number."""
+    return sorted(_distinct_texts(run, table, "block"))
 
 
-def _codes(column: list[str | None], names: Any) -> AnyArray:
-    """Return the number of each text among names, -1 for none."""
+def _index_of_names(column: list[str | None], names: Any) -> AnyArray:
+    """Return the index of each text among names, -1 if it is none of them."""
     known = names if isinstance(names, dict) else {name: i for i, name in enumerate(names)}
     codes = (_NO_TARGET if text is None else known.get(text, _NO_TARGET) for text in column)
     return np.fromiter(codes, dtype=np.int64, count=len(column))
 
 
-def _sources(run: RecordedTables, table: str) -> dict[str, AnyArray]:
-    """Return by number which block each row is of."""
-    names = _blocks(run, table)
-    return {"source": _codes(run.texts(table, "block"), names)} if names else {}
+def _source_columns(run: RecordedTables, table: str) -> dict[str, AnyArray]:
+    """Return column ``source``: each row's block as index among the table's; empty if none."""
+    names = _block_names(run, table)
+    return {"source": _index_of_names(run.texts(table, "block"), names)} if names else {}
 
 
 def _track_numbers_of(column: Any) -> AnyArray:
-    """Return numbers of tracks, -1 where there is none."""
+    """Return the track number of each row, -1 where a row has no track."""
     numbers = np.asarray(column, dtype=float)
     return np.where(np.isfinite(numbers), numbers, _NO_TARGET).astype(np.int64)
 
@@ -194,8 +204,8 @@ def _run_facts(info: dict[str, Any], scene: dict[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in facts.items() if value not in (None, "")}
 
 
-def _sensor(name: str, block: dict[str, Any], mark: Mark, on: str | None) -> dict[str, Any]:
-    """Return how a sensor is shown, and its field of view as far as the scene says it.
+def _sensor_entry(name: str, block: dict[str, Any], mark: Mark, on: str | None) -> dict[str, Any]:
+    """Return a sensor's page entry: name, colour, marker, and field of view as far as stated.
 
     `on` is what carries it, where there are several: about that it is drawn.
     """
@@ -217,26 +227,28 @@ def _sensor(name: str, block: dict[str, Any], mark: Mark, on: str | None) -> dic
 
 
 class _Poses:
-    """Where the ownship was, and other platforms: poses (6, n) and their times, in order."""
+    """True or believed poses (6, n) of ownship and other platforms, with times in order."""
 
     def __init__(self, run: RecordedTables, first: str | None) -> None:
         self._run, self._first = run, first
         self._known: dict[str | None, tuple[FloatArray, FloatArray]] = {}
 
     def of(self, platform: str | None) -> tuple[FloatArray, FloatArray]:
-        """Return one's poses, the ownship's of None: the truth, or what it believed."""
+        """Return the times and poses (6, n) of a platform (None for the ownship): true ones if
+        recorded, else those it believed.
+        """
         if platform not in self._known:
             self._known[platform] = self._read(platform)
         return self._known[platform]
 
     def _read(self, platform: str | None) -> tuple[FloatArray, FloatArray]:
         run, true = self._run, [name.removeprefix("own_") for name in POSE]
-        if run.has("truth", *true):
+        if run.has_columns("truth", *true):
             mine = np.array([name == platform for name in run.texts("truth", "target")], dtype=bool)
             if mine.any():
                 return self._in_order("truth", true, np.flatnonzero(mine))
         rows = np.arange(run.tables["detections"].num_rows)
-        if run.has("detections", "platform"):
+        if run.has_columns("detections", "platform"):
             on = run.texts("detections", "platform")
             rows = np.flatnonzero(np.array([one == (platform or self._first) for one in on]))
         return self._in_order("detections", list(POSE), rows)
@@ -248,21 +260,21 @@ class _Poses:
         return time_s, self._run.stack_columns(table, names, rows[first])
 
     def at(self, table: str, time_s: FloatArray, rows: IntArray | None = None) -> FloatArray:
-        """Return the latest poses, at some times, of what carries the blocks of a table's rows."""
-        if not self._run.has(table, "platform"):
-            return _pose_at(*self.of(None), time_s)
+        """Return for each row and its time its block's platform's latest pose, (6, n)."""
+        if not self._run.has_columns(table, "platform"):
+            return _latest_pose_at(*self.of(None), time_s)
         on = np.array(self._run.texts(table, "platform"), dtype=object)
         on = on if rows is None else on[rows]
         result = np.full((len(POSE), len(time_s)), np.nan)
         for name in {*on.tolist()}:
             mine = np.flatnonzero(on == name)
             poses = self.of(None if name == self._first else name)
-            result[:, mine] = _pose_at(*poses, time_s[mine])
+            result[:, mine] = _latest_pose_at(*poses, time_s[mine])
         return result
 
 
-def _plane_of(poses: _Poses) -> TangentPlane:
-    """Return the plane at where the ownship begins."""
+def _plane_at_start(poses: _Poses) -> TangentPlane:
+    """Return the tangent plane at the ownship's first position."""
     _, own = poses.of(None)
     return TangentPlane(float(own[0, 0]), float(own[1, 0])) if own.shape[1] else _NOWHERE
 
@@ -276,15 +288,18 @@ def _ownship_columns(
         "east_m": east,
         "north_m": north,
         "alt_m": own[2],
-        "heading_rad": np.unwrap(own[3] + plane.turned_rad(own)) if len(east) else east,
+        "heading_rad": np.unwrap(own[3] + plane.north_direction_rad(own)) if len(east) else east,
     }
 
 
 def _truth(
     run: RecordedTables, plane: TangentPlane, targets: Mapping[str, int]
 ) -> dict[str, AnyArray]:
-    """Return the targets' true positions, by target and then by time."""
-    code, time_s = _codes(run.texts("truth", "target"), targets), run.numbers("truth", "time_s")
+    """Return the true positions of the targets in the plane, sorted by target and then by time."""
+    code, time_s = (
+        _index_of_names(run.texts("truth", "target"), targets),
+        run.numbers("truth", "time_s"),
+    )
     keep = np.flatnonzero((code >= 0) & np.isfinite(run.numbers("truth", "lat_deg")))
     keep = keep[np.lexsort((time_s[keep], code[keep]))]
     position = [run.values("truth", name)[keep] for name in ("lat_deg", "lon_deg", "alt_m")]
@@ -304,7 +319,7 @@ def _estimates(
     poses: "_Poses",
     plane: TangentPlane,
 ) -> dict[str, AnyArray]:
-    """Return estimated states of tracks that live, along the plane's axes."""
+    """Return estimated positions and velocities of tracks not deleted, along the plane's axes."""
     status = np.array(run.texts("state_tracks", "track_status"), dtype=object)
     keep = np.flatnonzero(status != "deleted")
 
@@ -316,7 +331,7 @@ def _estimates(
     ends = offset_positions(run.stack_columns("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
     from_east, from_north = plane.east_north_m(*poses.at("state_tracks", time_s, keep)[:3])
-    turned = plane.turned_rad(origin)
+    turned = plane.north_direction_rad(origin)
     c, s = np.cos(turned), np.sin(turned)
     v_north, v_east = column("north_m_s"), column("east_m_s")
     nn, ne, ee = (column(f"covariance_{k}_m2") for k in ("00", "01", "11"))
@@ -324,7 +339,7 @@ def _estimates(
         "time_s": time_s,
         "number": np.asarray(run.values("state_tracks", "track"))[keep],
         **(
-            {"source": _codes(run.texts("state_tracks", "block"), trackers)[keep]}
+            {"source": _index_of_names(run.texts("state_tracks", "block"), trackers)[keep]}
             if trackers
             else {}
         ),
@@ -343,8 +358,8 @@ def _estimates(
     }
 
 
-def _pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> FloatArray:
-    """Return the ownship's latest poses at some times, (6, n), NaN before the first."""
+def _latest_pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> FloatArray:
+    """Return the latest pose at or before each time, (6, n); NaN before the first."""
     row = np.searchsorted(own_s, time_s, side="right") - 1
     return np.stack([np.append(values, np.nan)[row] for values in own])
 
@@ -352,18 +367,19 @@ def _pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> FloatArr
 def _lines_of_sight(
     run: RecordedTables, table: str, pose: FloatArray, plane: TangentPlane
 ) -> dict[str, AnyArray]:
-    """Return where measured lines of sight point, and where they end if they have a range.
+    """Return columns with the origin, bearing from north, elevation and range of measured lines of
+    sight, and their end points; NaN if unknown.
 
     Bearings are from north; what is not known is NaN.
     """
     line = run.stack_columns(table, LINE)
     from_east, from_north = plane.east_north_m(*pose[:3])
-    bearing, end = sights(line, pose)
+    bearing, end = bearings_and_end_points(line, pose)
     east_m, north_m = plane.east_north_m(*end)
     return {
         "from_east_m": from_east,
         "from_north_m": from_north,
-        "bearing_rad": bearing + plane.turned_rad(pose),
+        "bearing_rad": bearing + plane.north_direction_rad(pose),
         "elevation_rad": line[1],
         "range_m": line[2],
         "east_m": east_m,
@@ -373,7 +389,7 @@ def _lines_of_sight(
 
 
 def encounter_picture(path: Path) -> RunPicture:
-    """Return the page's picture of a recorded encounter (``.daa``), the ownship first."""
+    """Return what the page shows of a ``.daa`` encounter; its first aircraft is the ownship."""
     try:
         samples = read_daa_samples(path)
     except TrafficFileError as error:
@@ -385,7 +401,7 @@ def encounter_picture(path: Path) -> RunPicture:
     columns = []
     for number, table in enumerate(samples.values()):
         east, north = plane.east_north_m(table["lat"], table["lon"], table["alt"])
-        turned = plane.turned_rad((table["lat"], table["lon"]))
+        turned = plane.north_direction_rad((table["lat"], table["lon"]))
         track = np.unwrap(np.arctan2(table["ve"], table["vn"]) + turned)
         common = {"time_s": table["time"] - first, "east_m": east, "north_m": north}
         if number == 0:

@@ -33,7 +33,7 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
 AtInstants = Callable[[IntArray, FloatArray], Any]
 
 
-def acquisition_rate(
+def acquisition_rate_per_s(
     area_m2: ArrayLike,
     range_m: ArrayLike,
     *,
@@ -55,7 +55,7 @@ def acquisition_rate(
         return unflatten(beta * area / distance**2 * np.exp(-extinction * distance), shape)
 
 
-def closing_opportunity(
+def integrated_acquisition_rate(
     area_m2: float,
     closing_mps: float,
     *,
@@ -64,7 +64,8 @@ def closing_opportunity(
     beta_per_sr_s: float = UNALERTED_PER_SR_S,
     extinction_per_m: float = 0.0,
 ) -> float:
-    """Return the integral of the rate on a straight collision course, in closed form.
+    """Return the acquisition rate integrated over time while an aircraft closes from `from_m` to
+    `to_m` at constant speed (dimensionless).
 
     β A / V · (E2(k r)/r at `to_m` less that at `from_m`) with the extinction k and E2 the
     exponential integral; `from_m` may be infinite. The probability of acquisition is
@@ -92,10 +93,10 @@ def closing_opportunity(
     return scale * (illuminance_beyond(nearest) - illuminance_beyond(from_m))
 
 
-def round_share(
+def probability_met_by_round(
     closing_mps: float, *, from_m: float, to_m: float, round_s: float, looking: float = 1.0
 ) -> float:
-    """Return the probability that a search which comes round meets a closing aircraft, in time.
+    """Return the chance that a periodic search looks at a place between `from_m` and `to_m`.
 
     The place of the aircraft is looked at once in `round_s`, at a phase that is as likely as any
     other; it shows from `from_m` on and must be seen by `to_m`. `looking` is the probability that
@@ -106,25 +107,27 @@ def round_share(
 
 
 def angular_size_rad(area_m2: FloatArray, range_m: FloatArray) -> FloatArray:
-    """Return the diameter of the disc that has an area, as it is seen from afar."""
+    """Return the angular diameter, rad, of a disc of this area at this range."""
     size: FloatArray = np.sqrt(area_m2 * (4.0 / np.pi)) / range_m
     return size
 
 
-def farthest_shown_m(area_m2: float, smallest_rad: float) -> float:
-    """Return from where a disc of an area has the smallest angular size that shows."""
+def max_visible_range_m(area_m2: float, smallest_rad: float) -> float:
+    """Return the range (m) where a disc has the smallest visible angle; infinite if that is 0."""
     return float(np.sqrt(area_m2 * (4.0 / np.pi)) / smallest_rad) if smallest_rad else np.inf
 
 
-def integral_where_shown(before_s: FloatArray, shown: AtInstants, rate: AtInstants) -> FloatArray:
-    """Return the integral of a rate over the interval before each cell, while it shows.
+def integrate_rate_while_shown(
+    before_s: FloatArray, shown: AtInstants, rate: AtInstants
+) -> FloatArray:
+    """Return each cell's integral of a rate over the last `before_s` s, while the target shows.
 
     Whether something shows is asked at the ends of four parts of each interval; where it begins or
     ends to show within one, that instant is found by halving. Over each stretch the rate is
     integrated by Gauss and Legendre's rule of eight nodes. `shown` and `rate` (1/s) are given cells
     and seconds after them, 0 or less.
     """
-    cell, begin, end = _stretches(before_s, shown)
+    cell, begin, end = _shown_intervals(before_s, shown)
     integral = np.zeros(len(before_s))
     if not len(cell):
         return integral
@@ -139,8 +142,12 @@ def integral_where_shown(before_s: FloatArray, shown: AtInstants, rate: AtInstan
     return integral
 
 
-def _stretches(before_s: FloatArray, shown: AtInstants) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the stretches of the intervals in which something shows: cell, begin and end."""
+def _shown_intervals(
+    before_s: FloatArray, shown: AtInstants
+) -> tuple[IntArray, FloatArray, FloatArray]:
+    """Return the intervals in which a target shows, as three arrays: index of the cell, begin and
+    end in s (0 is now, earlier is negative).
+    """
     count = len(before_s)
     part = before_s / _SUBINTERVALS
     ends = [-before_s + k * part for k in range(_SUBINTERVALS)] + [np.zeros(count)]
@@ -169,7 +176,7 @@ def _find_change_s(
     last: BoolArray,
     shown: AtInstants,
 ) -> FloatArray:
-    """Return when what shows changes between two instants of some cells; the right one if not."""
+    """Return when visibility changes between `left` and `right`, by halving; else `right`."""
     edge = right.copy()
     which = np.flatnonzero(first != last)
     low, high = left[which], right[which]

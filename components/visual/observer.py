@@ -11,7 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 import numpy as np
 from pydantic import AfterValidator, Field, model_validator
 
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import FieldOfView
 from components.messages.reach import Reach
@@ -23,23 +23,23 @@ from components.optical.weather_effects import (
     Night,
     scene_visibility_m,
 )
-from components.sensor.ladder_values import measure_cells
-from components.sensor.look import Cells, Look, values_of
-from components.sensor.marks import EYES
+from components.sensor.ladder_values import make_cell_measure
+from components.sensor.look import Cells, Look, effect_values_of_cells
+from components.sensor.palette import EYES
 from components.sensor.parameters import (
     CorrelationTime,
     ErrorParameters,
     SensorParameters,
+    check_azimuths,
     check_elevations,
-    clockwise_azimuths,
 )
 from components.sensor.sensor import Sensor
 from components.visual.acquisition import (
     UNALERTED_PER_SR_S,
-    acquisition_rate,
+    acquisition_rate_per_s,
     angular_size_rad,
-    farthest_shown_m,
-    integral_where_shown,
+    integrate_rate_while_shown,
+    max_visible_range_m,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect
@@ -63,7 +63,7 @@ class LookoutParameters(SensorParameters):
 
     quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
 
-    azimuth_deg: Annotated[tuple[float, float], AfterValidator(clockwise_azimuths)] = Field(
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(check_azimuths)] = Field(
         default=(-110.0, 90.0),
         description="Field of view from the left seat, clockwise from the first to the second, "
         "deg; that from the right seat is its mirror image.",
@@ -127,7 +127,7 @@ class LookoutParameters(SensorParameters):
         return self
 
     def reach(self) -> Reach:
-        """Return the reach of all who look out."""
+        """Return the reach over all fields of view of active observers; disabled if none."""
         reach = super().reach()
         low, high = reach.azimuth_rad
         fields = [
@@ -157,7 +157,7 @@ class LookoutParameters(SensorParameters):
         return said
 
 
-def _acquisition(observer: Any, cells: Cells) -> dict[str, FloatArray]:
+def _acquisition_probability(observer: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return the probability that each cell's target was acquired since the last scan."""
     return {_PROBABILITY.name: observer.acquisition_probability(cells)}
 
@@ -172,13 +172,13 @@ BETWEEN_SCANS = Ladder(
     ),
     "integral",
     (_PROBABILITY,),
-    measure_cells(_acquisition, out_of_range=0.0),
+    make_cell_measure(_acquisition_probability, out_of_range=0.0),
 )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class _Seat:
-    """Who looks out from where: a field of view in the sensor's axes, and a share of the time."""
+    """One observer: number, field of view in sensor axes, and share of time looking out."""
 
     number: int
     field: FieldOfView
@@ -186,7 +186,7 @@ class _Seat:
 
 
 class _SeenBefore:
-    """What is seen of some cells at instants of their own, in place of `Cells`."""
+    """What is seen of chosen cells at other instants than their scans, readable like `Cells`."""
 
     def __init__(self, cells: Cells, which: IntArray, ahead_s: FloatArray) -> None:
         self.seen: Mapping[str, AnyArray] = cells.seen_at(which, ahead_s)
@@ -200,16 +200,16 @@ class _SeenBefore:
         return self.seen[name]
 
     def of_target(self, column: FloatArray) -> AnyArray:
-        """Return a column of the roster for each."""
+        """Return, for each chosen cell, the value of a roster column for its target."""
         return column[self.craft]
 
     def of_row(self, name: str) -> AnyArray:
-        """Return a field that has one value for each instant."""
+        """Return each cell's field (such as own altitude) at the cell's instant."""
         return self.seen[name]
 
 
 class Lookout(Sensor):
-    """Somebody who looks out: sees an aircraft from its acquisition on, while it is in view.
+    """One or two observers who see an aircraft from random acquisition on, while in view.
 
     With ``search = "random"`` acquisitions are a Poisson process whose rate is Andrews's; with
     ``"round"`` the place of an aircraft is looked at once a round, at a phase drawn for each run
@@ -242,11 +242,11 @@ class Lookout(Sensor):
         self._extinction_per_m = 0.0 if visibility_m is None else KOSCHMIEDER / visibility_m
         if self.built_one(DARKNESS):
             self.reach = replace(self.reach, enabled=False)
-        rosters = known_targets(self.context)
+        rosters = offered_rosters(self.context)
         if rosters and self._smallest_rad and not self.context.simulate_everything:
             bodies = [rosters[0].column(f"eo.{n}_m2") for n in ("front", "side", "horizontal")]
             largest_m2 = float(np.sum(bodies, axis=0).max(initial=0.0))
-            farthest_m = farthest_shown_m(largest_m2, self._smallest_rad) * _MARGIN + _MARGIN_M
+            farthest_m = max_visible_range_m(largest_m2, self._smallest_rad) * _MARGIN + _MARGIN_M
             nearer_m = min(self.reach.range_max_m, farthest_m)
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
@@ -268,17 +268,19 @@ class Lookout(Sensor):
         ]
 
     def look(self, cells: Cells) -> Look:
-        """Report aircraft acquired since the last scan, or earlier."""
+        """Draw new acquisitions since the last scan, and return a look that detects every acquired
+        aircraft still large enough to see.
+        """
         who = cells.run * len(cells.roster.names) + cells.target
         missing = int(who.max(initial=-1)) + 1 - len(self._first_seen)
         if missing > 0:
             never = np.full(missing, _NEVER)
             self._first_seen = np.concatenate([self._first_seen, never])
-        size = angular_size_rad(self._area(cells), cells.range_m)
+        size = angular_size_rad(self._visible_area_m2(cells), cells.range_m)
         limit = self._smallest_rad or _ARCMIN_RAD
         confidence = size / limit - 1.0
         extras: dict[str, AnyArray] = {}
-        if self._is_asked_for_looks:
+        if self._is_every_look_recorded:
             extras["detection_probability"] = self.acquisition_probability(cells)
         searched = np.flatnonzero(self._first_seen[who] > cells.scan)
         result = searched[self._draw_acquisitions(cells, searched)]
@@ -298,17 +300,19 @@ class Lookout(Sensor):
         return np.minimum(expected, 1.0) if self.p.search == "round" else -np.expm1(-expected)
 
     def _expected_acquisitions(self, cells: Cells, which: IntArray) -> FloatArray:
-        """Return the expected number of acquisitions of some cells since the last scan."""
+        """Return the cells' expected acquisitions since the last scan, summed over observers."""
         total = np.zeros(len(which))
         for seat in self._seats:
-            total += self._share(seat, cells, which) * self._search_integral(seat, cells, which)
+            total += self._looking_share(seat, cells, which) * self._integrated_search_rate(
+                seat, cells, which
+            )
         return total
 
     def _draw_acquisitions(self, cells: Cells, which: IntArray) -> BoolArray:
-        """Draw which of some cells' aircraft were acquired since the last scan."""
+        """Return which cells' aircraft are acquired, at random, since the last scan (mask)."""
         if self.p.search == "random":
             expected = self._expected_acquisitions(cells, which)
-            keys = cells.roster.keys_of(cells.target[which])
+            keys = cells.roster.draw_keys_of(cells.target[which])
             finds = self._finds.of_runs(cells.run[which], cells.instant_ns[which])
             drawn = finds.uniform(keys, cells.scan[which])
             return np.asarray(drawn < -np.expm1(-expected))
@@ -317,8 +321,10 @@ class Lookout(Sensor):
             result |= self._is_met_by_search(seat, cells, which)
         return result
 
-    def _search_integral(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
-        """Return each search rate integrated since the last scan, or the rounds in that time."""
+    def _integrated_search_rate(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
+        """Return, for each chosen cell, the search rate of a seat integrated since the last scan
+        while the aircraft shows; for a periodic search the number of rounds.
+        """
         before_s = self._since_last_scan_s(cells, which)
         if not len(which):
             return before_s
@@ -326,7 +332,7 @@ class Lookout(Sensor):
             now = np.where(self._is_shown(seat, cells)[which], before_s, 0.0)
             if self.p.search == "round":
                 return now / self.p.round_s
-            return now * self._rate(cells)[which]
+            return now * self._acquisition_rate_per_s(cells)[which]
 
         def shown(some: IntArray, ahead_s: FloatArray) -> BoolArray:
             return self._is_shown(seat, _SeenBefore(cells, which[some], ahead_s))
@@ -334,16 +340,16 @@ class Lookout(Sensor):
         def rate(some: IntArray, ahead_s: FloatArray) -> FloatArray:
             if self.p.search == "round":
                 return np.full(len(some), 1.0 / self.p.round_s)
-            return self._rate(_SeenBefore(cells, which[some], ahead_s))
+            return self._acquisition_rate_per_s(_SeenBefore(cells, which[some], ahead_s))
 
-        return integral_where_shown(before_s, shown, rate)
+        return integrate_rate_while_shown(before_s, shown, rate)
 
     def _is_met_by_search(self, seat: _Seat, cells: Cells, which: IntArray) -> BoolArray:
-        """Return at which cells a search that comes round met its aircraft since the last scan."""
-        share = self._share(seat, cells, which)
+        """Return which cells' visible aircraft a search looked at since the last scan (mask)."""
+        share = self._looking_share(seat, cells, which)
         looks = np.flatnonzero(share > 0.0)
         mine, share = which[looks], share[looks]
-        keys = cells.roster.keys_of(cells.target[mine])
+        keys = cells.roster.draw_keys_of(cells.target[mine])
         round_s = self.p.round_s / share
         phase_s = round_s * _draw_once_per_run(self._phases, cells.run[mine], keys, seat.number)
         now_s = cells.state_ns[mine] / NANOSECONDS
@@ -359,41 +365,47 @@ class Lookout(Sensor):
         return met
 
     def _since_last_scan_s(self, cells: Cells, which: IntArray) -> FloatArray:
-        """Return how long since the last scan, or since the run began; as at the scan, a period."""
+        """Return the time since the last scan, s, at most since the start of the run; always a scan
+        period if the option is as_at_scan.
+        """
         if self.p.between_scans == "as_at_scan":
             return np.full(len(which), self._period_s)
         return np.minimum(self._period_s, cells.state_ns[which] / NANOSECONDS)
 
-    def _share(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
-        """Return the share of time that somebody looks out; in spells, all or nothing of a run."""
+    def _looking_share(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
+        """Return the share of time that an observer looks out, (cells,); if looking comes in
+        spells, 1 or 0 drawn for the whole run.
+        """
         if self.p.looking == "glances":
             return np.full(len(which), seat.share)
         nobody = np.zeros(len(which), dtype=np.uint64)
         drawn = _draw_once_per_run(self._attends, cells.run[which], nobody, seat.number)
         return np.where(drawn < seat.share, 1.0, 0.0)
 
-    def _area(self, view: Any) -> FloatArray:
+    def _visible_area_m2(self, view: Any) -> FloatArray:
         return area_of_cells(view, "eo", "convex_hull")
 
-    def _rate(self, view: Any) -> FloatArray:
-        """Return Andrews's rate for each cell of a view."""
-        rate: FloatArray = acquisition_rate(
-            self._area(view),
+    def _acquisition_rate_per_s(self, view: Any) -> FloatArray:
+        """Return Andrews's acquisition rate per cell, 1/s, reduced by the air's transmission."""
+        rate: FloatArray = acquisition_rate_per_s(
+            self._visible_area_m2(view),
             np.maximum(view.range_m, 1.0),
             beta_per_sr_s=self.p.beta_per_sr_s,
             extinction_per_m=self._extinction_per_m,
         )
         for left in self.built(TRANSMISSION):
-            rate = rate * values_of(self, left, view)
+            rate = rate * effect_values_of_cells(self, left, view)
         return rate
 
     def _is_shown(self, seat: _Seat, view: Any) -> BoolArray:
-        """Return which cells of a view show to somebody."""
+        """Return which cells' aircraft are in view, in range, large enough, not hidden (mask)."""
         azimuth, elevation = self.axes(view.body_azimuth_rad, view.body_elevation_rad)
         shows = seat.field.holds(azimuth, elevation)
         shows &= view.range_m <= self.reach.range_max_m
         if self._smallest_rad:
-            shows &= angular_size_rad(self._area(view), view.range_m) >= self._smallest_rad
+            shows &= (
+                angular_size_rad(self._visible_area_m2(view), view.range_m) >= self._smallest_rad
+            )
         if isinstance(view, _SeenBefore):
             shows &= view.present
             if "hidden" in view.seen:
@@ -402,5 +414,5 @@ class Lookout(Sensor):
 
 
 def _draw_once_per_run(stream: Stream, run: IntArray, keys: AnyArray, number: int) -> FloatArray:
-    """Return uniform draws that stay the same throughout a run."""
+    """Return uniform draws in [0, 1), one for each run and key, that do not change during a run."""
     return stream.of_runs(run).uniform(keys, np.zeros(len(run), dtype=np.int64), number)

@@ -7,7 +7,7 @@ import numpy as np
 from components.well_clear.relative_motion import (
     Horizontal,
     Span,
-    horizontal_of,
+    horizontal_products,
     is_surely_less,
     meets_within_time,
     vertical_span,
@@ -21,7 +21,9 @@ LEAST_BOUND = 1e-3
 
 
 class Bounds(NamedTuple):
-    """How far the true relative state may lie from the one given, each (n,) and not negative."""
+    """Largest deviations of the true relative state from the given one: horizontal position,
+    height, horizontal velocity and climb rate, (n,) each.
+    """
 
     # Radius of the horizontal position, of the height, of the velocity, of the climb rate
     position_m: FloatArray
@@ -33,15 +35,18 @@ class Bounds(NamedTuple):
 def uncertain_violation_span(
     volume: Volume, relative: Relative, bounds: Bounds, begin_s: Any = 0.0, end_s: Any = np.inf
 ) -> Span:
-    """Return from when to when pairs of aircraft may violate a volume of modified tau.
+    """Return the interval (s) in which pairs in straight flight may violate a volume of modified
+    tau, if states are wrong by up to `bounds`.
 
     As `violation_span`; where all four bounds are 0, with its result.
     """
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
     e = Bounds(*(np.maximum(bound, LEAST_BOUND) for bound in bounds))
-    vertical = _vertical(volume, up, climb, e, end_s)
-    motion = horizontal_of(east, north, v_east, v_north)
-    horizontal = _horizontal(volume, (east, north, v_east, v_north), motion, e, end_s)
+    vertical = _uncertain_vertical_span(volume, up, climb, e, end_s)
+    motion = horizontal_products(east, north, v_east, v_north)
+    horizontal = _uncertain_horizontal_span(
+        volume, (east, north, v_east, v_north), motion, e, end_s
+    )
     entry = np.maximum(np.maximum(vertical.begin_s, horizontal.begin_s), begin_s)
     leave = np.minimum(vertical.end_s, horizontal.end_s)
     span = _restrict_span(Span(entry, leave), is_surely_less(entry, leave))
@@ -52,14 +57,18 @@ def uncertain_violation_span(
     return Span(*(np.where(known, *both) for both in zip(plain, span, strict=True)))
 
 
-def _vertical(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
-    above = _span_above(volume, up, climb, e, end_s)
-    below = _span_above(volume, -up, -climb, e, end_s)
-    return _hull(above, below)
+def _uncertain_vertical_span(
+    volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any
+) -> Span:
+    above = _uncertain_span_above(volume, up, climb, e, end_s)
+    below = _uncertain_span_above(volume, -up, -climb, e, end_s)
+    return _common_hull(above, below)
 
 
-def _span_above(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any) -> Span:
-    """Return the hull over the relative heights that are not negative."""
+def _uncertain_span_above(
+    volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, end_s: Any
+) -> Span:
+    """Return when the vertical condition may hold for a relative height at or above 0 in bounds."""
     low, high = np.maximum(up - e.height_m, 0.0), up + e.height_m
     slow, fast = climb - e.climb_mps, climb + e.climb_mps
 
@@ -70,10 +79,10 @@ def _span_above(volume: Volume, up: FloatArray, climb: FloatArray, e: Bounds, en
     first, last = span(low, slow), span(high, np.minimum(fast, 0.0))
     ends = np.where(np.isfinite(last.begin_s), last.end_s, end_s)
     there = (high >= 0.0) & (slow <= 0.0) & np.isfinite(first.begin_s)
-    return _hull(leaving, _restrict_span(Span(first.begin_s, ends), there))
+    return _common_hull(leaving, _restrict_span(Span(first.begin_s, ends), there))
 
 
-def _horizontal(
+def _uncertain_horizontal_span(
     volume: Volume,
     state: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     motion: Horizontal,
@@ -88,8 +97,8 @@ def _horizontal(
     slow = speed <= e.velocity_mps
     nearest, fastest = np.maximum(range_m - e.position_m, 0.0), speed + e.velocity_mps
     zero = np.zeros(np.shape(range_m))
-    head_on = horizontal_of(nearest, zero, -fastest, zero)
-    worst = _worst_pair(state, range_m, speed, nearest, fastest, e)
+    head_on = horizontal_products(nearest, zero, -fastest, zero)
+    worst = _most_direct_approach(state, range_m, speed, nearest, fastest, e)
     plain = horizontal_span(motion, volume, end_s).begin_s
     towards = worst.closing_m2_s < 0.0
     entry = np.minimum(
@@ -111,7 +120,7 @@ def _horizontal(
     )
 
 
-def _worst_pair(
+def _most_direct_approach(
     state: tuple[FloatArray, FloatArray, FloatArray, FloatArray],
     range_m: FloatArray,
     speed: FloatArray,
@@ -119,7 +128,8 @@ def _worst_pair(
     fastest: FloatArray,
     e: Bounds,
 ) -> Horizontal:
-    """Return the position and velocity within the bounds that lead most directly to each other.
+    """Return the relative position and velocity within the bounds that lead the aircraft most
+    directly towards each other.
 
     Angles count from the direction towards the intruder, in which the position's cone is centred.
     """
@@ -136,7 +146,7 @@ def _worst_pair(
     overlap: BoolArray = np.asarray(low <= high)
     of_position = np.where(overlap, 0.5 * (low + high), side * position_cone)
     of_velocity = np.where(overlap, 0.5 * (low + high), off - side * velocity_cone)
-    return horizontal_of(
+    return horizontal_products(
         -nearest * np.cos(of_position),
         -nearest * np.sin(of_position),
         fastest * np.cos(of_velocity),
@@ -148,7 +158,7 @@ def _restrict_span(span: Span, where: BoolArray) -> Span:
     return Span(np.where(where, span.begin_s, np.inf), np.where(where, span.end_s, -np.inf))
 
 
-def _hull(one: Span, other: Span) -> Span:
+def _common_hull(one: Span, other: Span) -> Span:
     return Span(np.minimum(one.begin_s, other.begin_s), np.maximum(one.end_s, other.end_s))
 
 
@@ -160,7 +170,7 @@ def detection_span(
     begin_s: Any,
     end_s: Any,
 ) -> Span:
-    """Return from when to when pairs of aircraft in straight flight meet a volume.
+    """Return when (s) pairs in straight flight violate a volume or are due a TCAS advisory.
 
     As `violation_span`. `own_up_mps` is the ownship's altitude (m) and climb (m/s) at time 0,
     without which an advisory raises `ValueError`; `bounds` say how far the states may be wrong, for
@@ -178,5 +188,5 @@ def detection_span(
 
 
 def select_bounds(bounds: Bounds | None, which: Any) -> Bounds | None:
-    """Return the bounds of some pairs; None where there are none."""
+    """Return the bounds of the chosen pairs, or None if no bounds are given."""
     return None if bounds is None else Bounds(*(np.asarray(bound)[which] for bound in bounds))

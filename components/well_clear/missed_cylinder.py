@@ -18,7 +18,7 @@ _TURNED_M, _CLIMBED_M, _SLACK = 350.0, 100.0, 0.15
 
 
 class Missed(NamedTuple):
-    """How encounters pass a cylinder, m, (runs,): to the side and up or down at the closest.
+    """Horizontal and vertical distances (m, one per run) by which encounters miss a cylinder.
 
     Then how near to the side while about its height apart or less, and how near up or down while
     about its radius apart or less (`widen_cylinders`); infinite where they never are. NaN where
@@ -32,14 +32,17 @@ class Missed(NamedTuple):
 
 
 def widen_cylinders(sizes_m: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Return cylinders that hold the little that manoeuvres move in the other direction."""
+    """Return cylinders (radius, half height) slightly enlarged, so that they also cover what
+    manoeuvres shift along the other direction.
+    """
     return [((1.0 + _SLACK) * radius_m, (1.0 + _SLACK) * half_m) for radius_m, half_m in sizes_m]
 
 
-def probability_led_into(
+def probability_of_induced_entry(
     size_m: tuple[float, float], missed: Missed, *, climbs: bool
 ) -> FloatArray:
-    """Return how likely it is that a manoeuvre leads into a cylinder that is just missed, to 1.
+    """Return an estimate (0 to 1, per run) of how likely a manoeuvre leads into a cylinder that is
+    just missed without it.
 
     By a turn only where somebody is met at the same altitude: whom it brings nearer to the side
     then, or who is near at the closest approach and met there earlier or later. 0 where nobody is.

@@ -26,7 +26,7 @@ _SLOW_MPS, _MARGIN_DEG = 0.5, 0.3
 
 @dataclass(frozen=True)
 class PairPaths:
-    """Ownships and intruders at the same times: (instants,), and north, east, altitude, m.
+    """Paths of each pair's ownship and intruder at common times: north, east and altitude, m.
 
     Positions are (3, instants, pairs).
     """
@@ -36,7 +36,7 @@ class PairPaths:
     other_m: FloatArray
 
     def cut_at(self, end_s: float) -> "PairPaths":
-        """Return the paths from time 0 to an end, s."""
+        """Return the paths cut at `end_s`, from time 0 on."""
         time_s = self.time_s
         if not len(time_s) or (time_s[0] >= 0.0 and time_s[-1] <= end_s):
             return self
@@ -54,7 +54,7 @@ class PairPaths:
 
 @dataclass(frozen=True)
 class Meetings:
-    """How the nearest intruder of each of many runs is met, by paths in the plane.
+    """How the nearest intruder passes in each of many runs, for paths in a plane.
 
     Time (s), horizontal and vertical distance (m), relative speed in the level plane (m/s), for how
     long before it was `foreseen` (s), course and bearing (degrees) at the closest approach, (7,
@@ -75,14 +75,14 @@ class Meetings:
     unsure_angles: BoolArray
 
 
-def meetings(
+def closest_meetings(
     paths: Iterable[tuple[IntArray, PairPaths]],
     runs: int,
     end_s: float,
     sizes_m: Sequence[tuple[float, float]],
     missed_m: Sequence[tuple[float, float]],
 ) -> Meetings:
-    """Return how runs meet whose pairs come in blocks, each with the runs that they are of.
+    """Return each run's passing of the nearest intruder, in blocks of pairs with run numbers.
 
     They are looked at from time 0 to `end_s`; cylinders are (radius, half height), m: as many that
     somebody comes inside of, or that are missed.
@@ -97,14 +97,16 @@ def meetings(
     for number, of in paths:
         pairs = PairsInPlane(of.cut_at(end_s))
         for k, limits in enumerate(sizes_m):
-            surely, maybe = pairs.classify_inside(*limits)
+            surely, maybe = pairs.masks_surely_and_unsurely_inside(*limits)
             inside[k, number[surely]] = True
             unsure[k, number[maybe]] = True
         for k, limits in enumerate(missed_m):
-            for found, miss_m in zip((beside_m, above_m), pairs.misses_m(*limits), strict=True):
+            for found, miss_m in zip(
+                (beside_m, above_m), pairs.least_distances_by_cylinder_m(*limits), strict=True
+            ):
                 np.minimum.at(found[k], number, miss_m)
-        closest, *angles = pairs.closest()
-        foreseen_s = pairs.foreseen_s(*sizes_m[0], closest[0])
+        closest, *angles = pairs.closest_approaches()
+        foreseen_s = pairs.conflict_foreseen_s(*sizes_m[0], closest[0])
         parts.append((number, np.insert(closest, 4, foreseen_s, axis=0), *angles))
     unsure &= ~inside
     if not parts:
@@ -122,20 +124,22 @@ def meetings(
     result.angles_deg[:, :, which] = angles_deg[:, :, pair]
     result.unsure_angles[which] = vague[pair]
     # Of two that come as near, either may be the nearer one.
-    close = (np.diff(number) == 0) & ~(range_m[1:] > range_m[:-1] + _slack_m(range_m[:-1]))
+    close = (np.diff(number) == 0) & ~(
+        range_m[1:] > range_m[:-1] + _closest_approach_tolerance_m(range_m[:-1])
+    )
     close &= np.diff(number[:-1], prepend=-1) != 0
     result.unsure_angles[number[:-1][close]] = True
     return result
 
 
-def _slack_m(range_m: FloatArray) -> FloatArray:
-    """Return by how much a closest approach may be farther than another, and yet be the closest."""
+def _closest_approach_tolerance_m(range_m: FloatArray) -> FloatArray:
+    """Return how much farther, m, an approach may be to count as closest, given the margins."""
     result: FloatArray = 2.0 * (_MARGIN_M + _MARGIN * range_m)
     return result
 
 
 class PairsInPlane:
-    """Pairs of paths, asked together."""
+    """Evaluates many pairs of paths in a plane at once."""
 
     def __init__(self, paths: PairPaths) -> None:
         self._paths = paths
@@ -157,10 +161,10 @@ class PairsInPlane:
             good &= np.abs(path[2]).max(axis=0, initial=0.0) <= _HIGHEST_M
             self.beyond |= ~(good & (step_m <= _LONGEST_M))
 
-    def classify_inside(
+    def masks_surely_and_unsurely_inside(
         self, horizontal_m: float, vertical_m: float
     ) -> tuple[BoolArray, BoolArray]:
-        """Return which pairs surely come inside a cylinder, and of which that is unsure."""
+        """Return which pairs enter the cylinder surely, and for which it is uncertain (masks)."""
         level, up, half = self._level_m, self._apart[2], self._half_m
         outer = self._widen_size(horizontal_m, 1.0), vertical_m + _MARGIN_M
         nearest = np.minimum(level[:-1], level[1:]) - half
@@ -175,16 +179,16 @@ class PairsInPlane:
         surely &= ~self.beyond
         return surely, (maybe & ~surely) | self.beyond
 
-    def misses_m(self, horizontal_m: float, vertical_m: float) -> FloatArray:
-        """Return how near pairs come to the side while a cylinder's height apart or less, and up or
-        down while its radius apart or less, (2, pairs); infinite where they never are.
+    def least_distances_by_cylinder_m(self, horizontal_m: float, vertical_m: float) -> FloatArray:
+        """Return (2, pairs), m: the least horizontal distance while within the cylinder's height,
+        and the least vertical distance while within its radius.
         """
         result = np.full((2, self._count), np.inf)
         up = self._apart[2]
         lowest, highest = np.minimum(up[:-1], up[1:]), np.maximum(up[:-1], up[1:])
         step, pair = ((lowest < vertical_m) & (highest > -vertical_m)).nonzero()
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
-        begin, end = _interval_in_height(apart[2], moved[2], vertical_m)
+        begin, end = _fractions_within_height(apart[2], moved[2], vertical_m)
         squared = moved[0] ** 2 + moved[1] ** 2
         part = -(apart[0] * moved[0] + apart[1] * moved[1])
         part = part / np.where(squared > 0.0, squared, 1.0)
@@ -194,7 +198,7 @@ class PairsInPlane:
         nearest = np.minimum(self._level_m[:-1], self._level_m[1:]) - self._half_m
         step, pair = (nearest < horizontal_m).nonzero()
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
-        begin, end, crosses = _interval_in_radius(apart, moved, horizontal_m)
+        begin, end, crosses = _fractions_within_radius(apart, moved, horizontal_m)
         begin, end = np.maximum(begin, 0.0), np.minimum(end, 1.0)
         there = (crosses & (begin < end)).nonzero()[0]
         ends = apart[2, there] + np.array([begin[there], end[there]]) * moved[2, there]
@@ -202,8 +206,9 @@ class PairsInPlane:
         np.minimum.at(result[1], pair[there], least)
         return result
 
-    def closest(self) -> tuple[FloatArray, FloatArray, BoolArray]:
-        """Return how pairs pass at the closest, from sample to sample in closed form.
+    def closest_approaches(self) -> tuple[FloatArray, FloatArray, BoolArray]:
+        """Return the closest approach of each pair (rows as in `Meetings`), bounds of course and
+        bearing there, and a mask of pairs where these are uncertain.
 
         Columns are those of `Meetings`, without what was foreseen: closest, between which angles,
         and where these are unsure.
@@ -218,20 +223,22 @@ class PairsInPlane:
         nearer = after[3] < before[3]
         time_s, level_m, up_m, best_m = np.where(nearer, after, before)
         own, other = self._velocities(np.where(nearer, steps[1], steps[0]), every)
-        angles = _angles_deg(own, other)
+        angles = _course_and_approach_bearing_deg(own, other)
         closest = np.array([time_s, level_m, up_m, np.hypot(*(other - own)), *angles % 360.0])
         # Wherever a pair may be closest, and over one sample more to both sides.
         near = np.minimum(range_m[:-1], range_m[1:]) - self._half_m - 0.5 * np.abs(self._moved[2])
-        near_by: BoolArray = near < best_m + _slack_m(best_m)
+        near_by: BoolArray = near < best_m + _closest_approach_tolerance_m(best_m)
         step, pair = near_by.nonzero()
         here_m = self._closest_between_samples(step, pair)[3]
-        near_by[step, pair] = here_m < best_m[pair] + _slack_m(best_m[pair])
+        near_by[step, pair] = here_m < best_m[pair] + _closest_approach_tolerance_m(best_m[pair])
         wider = near_by.copy()
         wider[1:] |= near_by[:-1]
         wider[:-1] |= near_by[1:]
         step, pair = wider.nonzero()
         own, other = self._velocities(step, pair)
-        off = (_angles_deg(own, other) - angles[:, pair] + 180.0) % 360.0 - 180.0
+        off = (
+            _course_and_approach_bearing_deg(own, other) - angles[:, pair] + 180.0
+        ) % 360.0 - 180.0
         between = np.zeros((2, 2, self._count))
         for k in (0, 1):
             np.minimum.at(between[k, 0], pair, off[k])
@@ -242,8 +249,11 @@ class PairsInPlane:
         vague[pair[np.any(slow, axis=0)]] = True
         return closest, between, vague
 
-    def foreseen_s(self, horizontal_m: float, vertical_m: float, until_s: FloatArray) -> FloatArray:
-        """Return for how long before some times straight flight on would have led into a cylinder.
+    def conflict_foreseen_s(
+        self, horizontal_m: float, vertical_m: float, until_s: FloatArray
+    ) -> FloatArray:
+        """Return for how many seconds before `until_s` each pair, extrapolated straight on, would
+        have entered the cylinder.
 
         So a conflict is told from `_FORESEEN_S` ahead, where sensors tell of it; one that comes by
         a late turn is foreseen late.
@@ -260,7 +270,9 @@ class PairsInPlane:
         return each_s.cumsum(axis=0)[-1] if len(each_s) else np.full(self._count, np.nan)
 
     def _closest_between_samples(self, step: IntArray, pair: IntArray) -> FloatArray:
-        """Return time, horizontal and vertical distance and range, on the way from samples on."""
+        """Return time, horizontal and vertical distance and range (4, n) of the closest approach
+        between each sample and the next.
+        """
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
         squared = (moved**2).sum(axis=0)
         part = -(apart * moved).sum(axis=0) / np.where(squared > 0.0, squared, 1.0)
@@ -271,7 +283,7 @@ class PairsInPlane:
         return np.array([time_s, level_m, np.abs(up), np.hypot(level_m, up)])
 
     def _velocities(self, step: IntArray, pair: IntArray) -> tuple[FloatArray, FloatArray]:
-        """Return velocities in the plane of both aircraft from a sample to the next, (2, n)."""
+        """Return velocities (2, n) north, east, m/s, between samples, of ownships and intruders."""
         own, other = (
             (at[:2, step + 1, pair] - at[:2, step, pair]) / self._lasts_s[step]
             for at in (self._paths.own_m, self._paths.other_m)
@@ -283,8 +295,8 @@ class PairsInPlane:
         return size_m + sign * (_MARGIN_M + _MARGIN * size_m)
 
 
-def _angles_deg(own: FloatArray, other: FloatArray) -> FloatArray:
-    """Return course of intruders and bearing from where they close in, by the ownship's course."""
+def _course_and_approach_bearing_deg(own: FloatArray, other: FloatArray) -> FloatArray:
+    """Return the intruder's course and approach direction, relative to own course, deg."""
     ways = own, other, own - other
     heading, course, closing = (np.degrees(np.arctan2(way[1], way[0])) for way in ways)
     return np.array([course - heading, closing - heading])
@@ -293,21 +305,21 @@ def _angles_deg(own: FloatArray, other: FloatArray) -> FloatArray:
 def _enters_cylinder(
     apart: FloatArray, moved: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
-    """Return which straight relative displacements `moved` from `apart`, both (3, n), enter a
-    cylinder.
-    """
-    begin, end, crosses = _interval_in_radius(apart, moved, horizontal_m)
-    low, high = _interval_in_height(apart[2], moved[2], vertical_m)
+    """Return which straight movements from `apart` by `moved` ((3, n) each) enter the cylinder."""
+    begin, end, crosses = _fractions_within_radius(apart, moved, horizontal_m)
+    low, high = _fractions_within_height(apart[2], moved[2], vertical_m)
     first = np.maximum(np.maximum(begin, low), 0.0)
     last = np.minimum(np.minimum(end, high), 1.0)
     entered: BoolArray = crosses & (first < last)
     return entered
 
 
-def _interval_in_radius(
+def _fractions_within_radius(
     apart: FloatArray, moved: FloatArray, horizontal_m: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return from which to which part of straight ways they are within a radius; and if at all."""
+    """Return begin and end, as fractions of each straight movement, within which it is inside a
+    radius, and a mask that is False where it never is.
+    """
     north, east = apart[:2]
     a = moved[0] ** 2 + moved[1] ** 2
     b = north * moved[0] + east * moved[1]
@@ -321,10 +333,10 @@ def _interval_in_radius(
     return begin, end, crosses
 
 
-def _interval_in_height(
+def _fractions_within_height(
     up: FloatArray, climbed: FloatArray, vertical_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return from which to which part of straight ways they are within so much up or down."""
+    """Return begin and end, as fractions of movements, of being vertically within `vertical_m`."""
     climbs = climbed != 0.0
     rate = np.where(climbs, climbed, 1.0)
     edges = (-vertical_m - up) / rate, (vertical_m - up) / rate

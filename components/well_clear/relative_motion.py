@@ -21,7 +21,7 @@ _CLOSE = DOUBLES_APART * 2.0**-52
 def nearly_equal(
     first: Any, second: Any, doubles_apart: int = DOUBLES_APART, tiny: float = TINY
 ) -> BoolArray:
-    """Return whether numbers are equal up to rounding; infinities of one sign are.
+    """Return a mask: True where two numbers, or equal infinities, are equal up to rounding.
 
     At most `doubles_apart` steps from one double to the next lie between them, or both are below
     `tiny` where one of them is 0.
@@ -37,7 +37,7 @@ def nearly_equal(
 
 
 def is_surely_less(first: Any, second: Any) -> BoolArray:
-    """Return whether the first number is less than the second by more than rounding."""
+    """Return a mask: True where the first is less than the second beyond rounding error."""
     first, second = np.asarray(first), np.asarray(second)
     less = np.asarray(first < second)
     with np.errstate(invalid="ignore"):  # of infinities of one sign, neither is less
@@ -55,7 +55,7 @@ def nearly_zero(values: FloatArray) -> BoolArray:
 
 
 class Horizontal(NamedTuple):
-    """Products of the relative position s and the relative velocity v, arrays of one shape."""
+    """Scalar and cross products of relative position s and velocity v, arrays of one shape."""
 
     range_sq_m2: FloatArray  # s·s
     closing_m2_s: FloatArray  # s·v, negative while the aircraft come closer
@@ -64,10 +64,10 @@ class Horizontal(NamedTuple):
     cross_m2_s: FloatArray
 
 
-def horizontal_of(
+def horizontal_products(
     east_m: FloatArray, north_m: FloatArray, east_mps: FloatArray, north_mps: FloatArray
 ) -> Horizontal:
-    """Return the products of relative position and velocity, east and north."""
+    """Return s·s, s·v, v·v and s×v of relative position s and velocity v, east and north."""
     return Horizontal(
         east_m * east_m + north_m * north_m,
         east_m * east_mps + north_m * north_mps,
@@ -84,7 +84,7 @@ def time_to_closest_s(motion: Horizontal) -> FloatArray:
 
 
 def discriminant(motion: Horizontal, radius_m: float | FloatArray) -> FloatArray:
-    """Return (radius · speed)² − cross², not negative where the line of flight meets the circle.
+    """Return (radius · speed)² − cross²; not negative where a straight flight meets the circle.
 
     As a product of sum and difference, so that a grazing flight is as exact as its radius.
     """
@@ -96,7 +96,7 @@ def discriminant(motion: Horizontal, radius_m: float | FloatArray) -> FloatArray
 def entry_of_circle_s(
     motion: Horizontal, radius_m: float | FloatArray, root: FloatArray
 ) -> FloatArray:
-    """Return when the line of flight enters a circle, given the square root of the `discriminant`.
+    """Return when, s, straight flight enters a circle about the origin; `root`: √`discriminant`.
 
     It is of either sign, and meaningless where there is no relative motion.
     """
@@ -111,7 +111,7 @@ def entry_of_circle_s(
 def exit_of_circle_s(
     motion: Horizontal, radius_m: float | FloatArray, root: FloatArray
 ) -> FloatArray:
-    """Return when the line of flight leaves a circle; as `entry_of_circle_s`."""
+    """Return when, s, straight flight leaves a circle about the origin; `root`: √`discriminant`."""
     p, outside = motion.closing_m2_s, motion.range_sq_m2 - radius_m * radius_m
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.asarray(
@@ -120,7 +120,7 @@ def exit_of_circle_s(
 
 
 class Span(NamedTuple):
-    """From when to when something holds, s; infinity to minus infinity where it never does."""
+    """Begin and end, s, of when a condition holds; infinity and minus infinity if never."""
 
     begin_s: FloatArray
     end_s: FloatArray
@@ -134,7 +134,8 @@ def vertical_span(
     begin_s: float | FloatArray,
     end_s: float | FloatArray,
 ) -> Span:
-    """Return when, in [begin, end], the height difference, or its time, is small enough.
+    """Return the interval within [begin_s, end_s] in which the height difference, or the time until
+    it is 0, is within its threshold.
 
     Sizes are those of `components.well_clear.volume.Volume`. A level flight is inside all the time
     or never.
@@ -180,7 +181,8 @@ def time_to_entry_s(motion: Horizontal, distance_m: float) -> FloatArray:
 def meets_within_time(
     motion: Horizontal, distance_m: float, time_s: float, time_variable: str
 ) -> BoolArray:
-    """Return whether the flight passes within a distance while its time variable is small.
+    """Return a mask: True where the flight passes within the distance and its time variable (such
+    as modified tau) lies between 0 and `time_s`.
 
     It is one of `components.well_clear.volume.TIME_VARIABLES`; "none" is never short.
     """

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.well_clear.relative_motion import (
-    horizontal_of,
+    horizontal_products,
     modified_tau_s,
     nearly_zero,
     time_to_closest_s,
@@ -16,7 +16,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 class PairSeparation(NamedTuple):
-    """Present and projected distances of pairs of aircraft, each (n,)."""
+    """Present distances, relative speeds, projected closest distances of pairs, (n,) each."""
 
     horizontal_m: FloatArray  # Distances now
     vertical_m: FloatArray
@@ -36,13 +36,13 @@ class PairSeparation(NamedTuple):
 def separation(
     relative: Relative, lookahead_s: float, tau_distance_m: FloatArray
 ) -> PairSeparation:
-    """Return present and projected distances in straight flight, looking so far ahead.
+    """Return distances, relative speeds, and closest distances projected within `lookahead_s`.
 
     `relative` is as for `violation_span`; a `tau_distance_m` (n,) that is NaN gives no modified
     tau.
     """
     east, north, up, v_east, v_north, climb = relative
-    motion = horizontal_of(east, north, v_east, v_north)
+    motion = horizontal_products(east, north, v_east, v_north)
     range_m = np.sqrt(motion.range_sq_m2)
     closest_s = time_to_closest_s(motion)
     ahead_s = np.maximum(closest_s, 0.0)
@@ -90,7 +90,7 @@ def first_inside_cylinder(
     horizontal_m: float,
     vertical_m: float,
 ) -> FloatArray:
-    """Return when pairs of flights first are inside a cylinder, s; NaN for those that never are.
+    """Return when, s, each pair of flights is first inside a cylinder; NaN if never.
 
     `apart` gives the horizontal distance and the difference in height (m, not negative) of pairs
     (n,) at times (n,); neither changes faster than `closing_mps` (pairs,). `between_s` are the
@@ -132,7 +132,9 @@ def _first_inside_of_some(
         half = 0.5 * length
         across_m, high_m = apart(first + pair, start + half[pair])
         drift_m = (closing_mps * half)[pair]
-        maybe, within = _classify_pieces(across_m, high_m, drift_m, horizontal_m, vertical_m)
+        maybe, within = _masks_possibly_and_surely_inside(
+            across_m, high_m, drift_m, horizontal_m, vertical_m
+        )
         pieces = np.bincount(pair[maybe], minlength=len(length))
         last = ((length <= FINEST_S) | (2 * pieces > _MOST_PIECES))[pair]
         inside = (across_m < horizontal_m) & (high_m < vertical_m)
@@ -146,14 +148,14 @@ def _first_inside_of_some(
     return np.where(np.isfinite(earliest), earliest, np.nan)
 
 
-def _classify_pieces(
+def _masks_possibly_and_surely_inside(
     across_m: FloatArray,
     high_m: FloatArray,
     drift_m: FloatArray | float,
     horizontal_m: float,
     vertical_m: float,
 ) -> tuple[BoolArray, BoolArray]:
-    """Return which pieces may hold a time inside, and which are surely inside all through."""
+    """Return in which pieces a pair may be inside at some time, and surely throughout (masks)."""
     maybe = (across_m - drift_m < horizontal_m) & (high_m - drift_m < vertical_m)
     within = (across_m + drift_m <= horizontal_m) & (high_m + drift_m <= vertical_m)
     return maybe, within

@@ -5,15 +5,15 @@ from typing import Any
 import numpy as np
 
 from components.arguments.units import FOOT_M
-from components.well_clear.relative_motion import horizontal_of, time_to_closest_s
+from components.well_clear.relative_motion import horizontal_products, time_to_closest_s
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import FloatArray
 
 
 def miss_distance_m(relative: Relative) -> FloatArray:
-    """Return the horizontal miss distance of straight flights, the distance now if it is past."""
+    """Return horizontal distance, m, at closest approach in straight flight, or now if past."""
     east, north, _, v_east, v_north, _ = relative
-    motion = horizontal_of(east, north, v_east, v_north)
+    motion = horizontal_products(east, north, v_east, v_north)
     ahead_s = np.maximum(time_to_closest_s(motion), 0.0)
     return np.hypot(east + ahead_s * v_east, north + ahead_s * v_north)
 
@@ -70,8 +70,12 @@ GOOD_CHANCE = np.array([0.391, 0.320, 0.345, 0.610, 0.610, 0.610])
 POOR_SCALE_M = np.array([60.0, 60.0, 69.0, 87.0, 101.0, 101.0]) * FOOT_M
 
 
-def altimeter_scales(altitude_m: Any, mode_c: bool) -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """Return (chance, scale in m) of each altimeter an aircraft may have: Mode C's, or any."""
+def altimeter_error_mixture(
+    altitude_m: Any, mode_c: bool
+) -> tuple[tuple[FloatArray, FloatArray], ...]:
+    """Return pairs (probability, Laplace scale in m) for each kind of altimeter an aircraft may
+    have: two kinds with Mode C, else one.
+    """
     layer = np.searchsorted(LAYER_TOPS_M, np.asarray(altitude_m), side="left")
     if not mode_c:
         return ((np.ones(np.shape(layer)), SCALE_M[layer]),)
@@ -80,7 +84,8 @@ def altimeter_scales(altitude_m: Any, mode_c: bool) -> tuple[tuple[FloatArray, F
 
 
 def laplace_difference_exceedance(height_m: Any, scale_m: Any, other_scale_m: Any) -> FloatArray:
-    """Return the chance that the difference of two Laplace errors exceeds a height of any sign.
+    """Return the probability that the difference of two independent Laplace errors is greater than
+    `height_m`, which may be negative.
 
     With c = 1/λ of either error, the tail is a mixture of exponentials; nearly equal scales are
     taken through the limit, whose error is of second order in their difference.
@@ -106,7 +111,7 @@ def collision_probability(
     horizontal_m: float = 500 * FOOT_M,
     vertical_m: float = 100 * FOOT_M,
 ) -> FloatArray:
-    """Return the probability of a near mid-air collision at the closest approach.
+    """Return the NMAC probability at closest approach, given both aircraft's altimeter errors.
 
     Parameters
     ----------
@@ -125,8 +130,8 @@ def collision_probability(
     """
     height = np.asarray(height_m, dtype=float)
     within = np.zeros(np.shape(height))
-    for chance, scale in altimeter_scales(altitude_m[0], mode_c[0]):
-        for other_chance, other in altimeter_scales(altitude_m[1], mode_c[1]):
+    for chance, scale in altimeter_error_mixture(altitude_m[0], mode_c[0]):
+        for other_chance, other in altimeter_error_mixture(altitude_m[1], mode_c[1]):
             inside = laplace_difference_exceedance(
                 -vertical_m - height, scale, other
             ) - laplace_difference_exceedance(vertical_m - height, scale, other)

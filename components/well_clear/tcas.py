@@ -10,7 +10,7 @@ from components.well_clear.relative_motion import (
     Span,
     discriminant,
     exit_of_circle_s,
-    horizontal_of,
+    horizontal_products,
     is_surely_less,
     nearly_zero,
     vertical_span,
@@ -20,7 +20,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 
 
 class Thresholds(NamedTuple):
-    """Sizes of an advisory at one sensitivity level; `miss_m` is infinite without a filter."""
+    """Time, distance and height thresholds of a TCAS advisory at one sensitivity level."""
 
     tau_s: float
     distance_m: float
@@ -35,7 +35,9 @@ class TcasAdvisory:
     resolution: bool  # Resolution advisory; otherwise traffic advisory
 
 
-def _sizes(tau_s: float, nmi: float, height_ft: float, miss_ft: float = np.inf) -> Thresholds:
+def _thresholds_in_si(
+    tau_s: float, nmi: float, height_ft: float, miss_ft: float = np.inf
+) -> Thresholds:
     return Thresholds(tau_s, nmi * NAUTICAL_MILE_M, height_ft * FOOT_M, miss_ft * FOOT_M)
 
 
@@ -44,22 +46,22 @@ LEVEL_TOPS_M = np.array([1000.0, 2350.0, 5000.0, 10_000.0, 20_000.0, 42_000.0]) 
 FIRST_LEVEL = 2
 #: By level from `FIRST_LEVEL`; TCAS II version 7.1, FAA booklet HQ-111358 (2011), table 2.
 TRAFFIC_ADVISORY = (
-    _sizes(20, 0.30, 850),
-    _sizes(25, 0.33, 850),
-    _sizes(30, 0.48, 850),
-    _sizes(40, 0.75, 850),
-    _sizes(45, 1.00, 850),
-    _sizes(48, 1.30, 850),
-    _sizes(48, 1.30, 1200),
+    _thresholds_in_si(20, 0.30, 850),
+    _thresholds_in_si(25, 0.33, 850),
+    _thresholds_in_si(30, 0.48, 850),
+    _thresholds_in_si(40, 0.75, 850),
+    _thresholds_in_si(45, 1.00, 850),
+    _thresholds_in_si(48, 1.30, 850),
+    _thresholds_in_si(48, 1.30, 1200),
 )
 RESOLUTION_ADVISORY = (
     None,
-    _sizes(15, 0.20, 600, 1215),
-    _sizes(20, 0.35, 600, 2126),
-    _sizes(25, 0.55, 600, 3342),
-    _sizes(30, 0.80, 600, 4861),
-    _sizes(35, 1.10, 700, 6683),
-    _sizes(35, 1.10, 800, 6683),
+    _thresholds_in_si(15, 0.20, 600, 1215),
+    _thresholds_in_si(20, 0.35, 600, 2126),
+    _thresholds_in_si(25, 0.55, 600, 3342),
+    _thresholds_in_si(30, 0.80, 600, 4861),
+    _thresholds_in_si(35, 1.10, 700, 6683),
+    _thresholds_in_si(35, 1.10, 800, 6683),
 )
 
 
@@ -79,7 +81,8 @@ def sensitivity_level(altitude_m: FloatArray) -> IntArray:
 
 
 def recovery_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the radius and half height that recovery keeps clear where no sizes are given.
+    """Return radius and half height (m) of the cylinder to keep clear in recovery, from the TCAS
+    sensitivity level at the ownship's altitude.
 
     They are the miss distance and the height of resolution advisories, of level 3 at least, at the
     ownship's altitude.
@@ -101,7 +104,7 @@ def tcas_span(
     begin_s: Any = 0.0,
     end_s: Any = np.inf,
 ) -> Span:
-    """Return from when to when an advisory is due in straight flight.
+    """Return when (s) a TCAS traffic or resolution advisory is due for pairs flying straight.
 
     Parameters
     ----------
@@ -131,7 +134,7 @@ def tcas_span(
         first_s, till_s = _interval_between_altitudes(
             altitude_m, climb_mps, bottom_m, top_m, begin_s, end_s
         )
-        span = _span(relative, sizes, first_s, np.maximum(till_s, first_s))
+        span = _advisory_span(relative, sizes, first_s, np.maximum(till_s, first_s))
         there = is_surely_less(first_s, till_s)
         entry = np.where(there, np.minimum(entry, span.begin_s), entry)
         leave = np.where(there, np.maximum(leave, span.end_s), leave)
@@ -146,7 +149,7 @@ def _interval_between_altitudes(
     begin_s: Any,
     end_s: Any,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return from when to when the ownship is between two altitudes, s."""
+    """Return begin and end (s) in [begin_s, end_s] of the ownship being between two altitudes."""
     level = climb_mps == 0.0
     rate = np.where(level, 1.0, climb_mps)
     one, other = (bottom_m - altitude_m) / rate, (top_m - altitude_m) / rate
@@ -158,14 +161,16 @@ def _interval_between_altitudes(
     return within[0], within[1]
 
 
-def _span(relative: Relative, sizes: Thresholds, begin_s: FloatArray, end_s: FloatArray) -> Span:
-    """Return the interval of one sensitivity level's advisory in [begin, end]."""
+def _advisory_span(
+    relative: Relative, sizes: Thresholds, begin_s: FloatArray, end_s: FloatArray
+) -> Span:
+    """Return when in [begin_s, end_s] the advisory of one sensitivity level is due."""
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
     vertical = vertical_span(up, climb, sizes.height_m, sizes.tau_s, begin_s, end_s)
     some = is_surely_less(vertical.begin_s, vertical.end_s)
     start = np.where(some, vertical.begin_s, 0.0)
     length = np.where(some, vertical.end_s - start, 0.0)
-    motion = horizontal_of(east + start * v_east, north + start * v_north, v_east, v_north)
+    motion = horizontal_products(east + start * v_east, north + start * v_north, v_east, v_north)
     q, p, a, _ = motion
     delta = discriminant(motion, sizes.distance_m)
     root = np.sqrt(np.maximum(delta, 0.0))

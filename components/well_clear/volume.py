@@ -15,7 +15,7 @@ from components.well_clear.relative_motion import (
     discriminant,
     entry_of_circle_s,
     exit_of_circle_s,
-    horizontal_of,
+    horizontal_products,
     is_surely_less,
     meets_within_time,
     nearly_equal,
@@ -78,7 +78,7 @@ PRESETS: Mapping[str, Volume] = MappingProxyType(
 
 
 def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | FloatArray) -> Span:
-    """Return when, in [0, duration], the horizontal condition of a volume holds.
+    """Return when, in 0 to `duration_s`, the horizontal condition of a volume holds.
 
     It is one interval: the set is convex for every time variable.
     """
@@ -99,7 +99,9 @@ def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | Floa
 def _entry_time_from_outside(
     motion: Horizontal, volume: Volume, delta: FloatArray, root: FloatArray, still: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the entry of those who are not yet within the radius, and whether there is one."""
+    """Return the time at which pairs outside the radius meet the horizontal condition, and a mask
+    that is True where there can be an entry.
+    """
     tau_s = volume.horizontal_time_s
     if volume.time_variable == "modified_tau":
         return _modified_tau_entry(motion, volume, delta), motion.closing_m2_s < 0.0
@@ -131,7 +133,7 @@ Relative = Sequence[Any]
 
 
 def violates(volume: Volume, relative: Relative) -> BoolArray:
-    """Return whether pairs of aircraft violate a volume now.
+    """Return a mask over pairs of aircraft: True where the volume is violated now.
 
     Parameters
     ----------
@@ -143,8 +145,8 @@ def violates(volume: Volume, relative: Relative) -> BoolArray:
     -------
     (n,) of bool
     """
-    east, north, up, v_east, v_north, climb = _arrays(relative)
-    motion = horizontal_of(east, north, v_east, v_north)
+    east, north, up, v_east, v_north, climb = _float_arrays(relative)
+    motion = horizontal_products(east, north, v_east, v_north)
     radius_m = volume.horizontal_m
     near = (motion.range_sq_m2 <= radius_m * radius_m) | meets_within_time(
         motion, radius_m, volume.horizontal_time_s, volume.time_variable
@@ -157,7 +159,7 @@ def violates(volume: Volume, relative: Relative) -> BoolArray:
 def violation_span(
     volume: Volume, relative: Relative, begin_s: Any = 0.0, end_s: Any = np.inf
 ) -> Span:
-    """Return from when to when pairs of aircraft in straight flight violate a volume.
+    """Return the interval (s) in which pairs of aircraft in straight flight violate a volume.
 
     Parameters
     ----------
@@ -178,11 +180,11 @@ def violation_span(
     The vertical condition holds in one interval; within it the horizontal one is a quadratic,
     solved in the form whose terms do not cancel.
     """
-    east, north, up, v_east, v_north, climb = _arrays(relative)
+    east, north, up, v_east, v_north, climb = _float_arrays(relative)
     vertical = vertical_span(up, climb, volume.vertical_m, volume.vertical_time_s, begin_s, end_s)
     some = is_surely_less(vertical.begin_s, vertical.end_s)
     start = np.where(some, vertical.begin_s, 0.0)
-    motion = horizontal_of(east + start * v_east, north + start * v_north, v_east, v_north)
+    motion = horizontal_products(east + start * v_east, north + start * v_north, v_east, v_north)
     duration = np.where(some, vertical.end_s - start, 0.0)
     within = horizontal_span(motion, volume, duration)
     entry, leave = start + within.begin_s, start + within.end_s
@@ -190,14 +192,14 @@ def violation_span(
     return Span(np.where(some, entry, np.inf), np.where(some, leave, -np.inf))
 
 
-def _arrays(relative: Relative) -> list[FloatArray]:
+def _float_arrays(relative: Relative) -> list[FloatArray]:
     return [np.asarray(part, dtype=np.float64) for part in relative]
 
 
 def is_inside_cylinder(
     distance_m: FloatArray, height_m: FloatArray, horizontal_m: float, vertical_m: float
 ) -> BoolArray:
-    """Return whether aircraft are within a cylinder now, its boundary excluded."""
+    """Return a mask: True where the aircraft is inside the cylinder now, its boundary excluded."""
     return np.asarray((distance_m < horizontal_m) & (np.abs(height_m) < vertical_m))
 
 
@@ -208,13 +210,13 @@ def cylinder_span(
     begin_s: Any = 0.0,
     end_s: Any = np.inf,
 ) -> Span:
-    """Return from when to when pairs in straight flight are inside a cylinder.
+    """Return the interval (s) in which pairs in straight flight are inside a cylinder.
 
     As `violation_span`; sizes are radius and half height. It is an open interval: touching the
     cylinder is not entering it.
     """
     east, north, up, v_east, v_north, climb = (np.asarray(x, dtype=np.float64) for x in relative)
-    motion = horizontal_of(east, north, v_east, v_north)
+    motion = horizontal_products(east, north, v_east, v_north)
     delta = discriminant(motion, horizontal_m)
     root = np.sqrt(np.maximum(delta, 0.0))
     radius_sq = np.asarray(horizontal_m * horizontal_m)

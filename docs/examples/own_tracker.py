@@ -5,7 +5,7 @@ from pydantic import Field
 
 import dsa_des
 from components.messages import FusedDetections, Tracks
-from components.messages.false_detections import true_entries
+from components.messages.false_detections import without_false_alarms
 from dsa_des.block.wake import Wake
 
 
@@ -31,7 +31,7 @@ class SmoothingTracker(dsa_des.Component):
         fused = wake["fused"]
         if fused is None:
             return None
-        fused = true_entries(fused)  # a false alarm belongs to no target
+        fused = without_false_alarms(fused)  # a false alarm belongs to no target
         if len(fused.target) == 0:
             return None
         azimuth, elevation = fused.azimuth_rad.copy(), fused.elevation_rad.copy()

@@ -19,7 +19,7 @@ from docs.make.stamp import stamped
 from dsa_des.block.mark import BLUE, PINK
 from dsa_des.files.output_file import write_file
 from dsa_des.library.runs import run
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 #: A radar with a carrier and PRF for Doppler, a gain that is its beam's, and a Pfa as radars have.
 RADAR: dict[str, Any] = {
@@ -225,7 +225,7 @@ def page(images: Path, *, seeds: int = 10) -> str:
     draw(images / FIGURE)
     found = MovingTargetFilter("filter_bank", RADAR["prf_hz"], wavelength_m())
     speeds = [(i + 0.5) / 500 * found.blind_speed_m_s for i in range(500)]
-    bank_loss = -10.0 * math.log10(float(np.mean(found.gains(speeds)[0])))
+    bank_loss = -10.0 * math.log10(float(np.mean(found.target_and_clutter_gains(speeds)[0])))
     losses = {
         f"loss_{cells}": cfar_loss_db(0.5, reference_cells=cells, false_alarm_probability=1e-6)
         for cells in (8, 16, 64)
@@ -299,5 +299,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

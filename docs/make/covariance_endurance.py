@@ -21,11 +21,11 @@ from components.estimation.frame import SensorPose
 from components.estimation.interacting_models import InteractingMultipleModels
 from components.estimation.kalman import innovation, update
 from components.estimation.measurement import Kind, expected_measurement, linearise, residual
-from components.estimation.modified_polar import correct_in_polar
+from components.estimation.modified_polar import apply_correction_in_polar
 from components.estimation.motion import ConstantVelocity, CoordinatedTurn, predict
 from components.estimation.unscented import SigmaPoints, predict_unscented, unscented_moments
 from dsa_des.arrays.types import FloatArray
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 _DAYS, _SIGMA = 30.0, SigmaPoints()
@@ -97,7 +97,7 @@ def endure(name: str, updates: int, count: int = 40, seed: int = 1) -> Endured:
             found = innovation(*linearise(kind, state, place), covariance, spread)
         after = update(state, covariance, found, residual(seen, found.expected))
         if name == "polar" and not kind.has_range:
-            after = correct_in_polar(state, *after, place.position_m)
+            after = apply_correction_in_polar(state, *after, place.position_m)
         state, covariance = after
     if name == "imm":
         worst = [_quality(spread) for spread in tracks.covariances]
@@ -165,5 +165,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

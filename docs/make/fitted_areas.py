@@ -15,7 +15,7 @@ import sys
 from collections.abc import Sequence
 
 from components.optical.silhouette import visible_area
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 # Halvings of the bracket around the plate's area: down to the last bit.
@@ -87,5 +87,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

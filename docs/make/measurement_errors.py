@@ -13,7 +13,7 @@ import numpy as np
 
 import dsa_des
 from components.thesis.drawing import EO, RADAR, panels
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 FIGURE = "measurement_errors.png"
 BY_SIGNAL = (
@@ -64,5 +64,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

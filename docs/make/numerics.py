@@ -7,7 +7,7 @@ from pathlib import Path
 
 from docs.make.numerical_cases import NumericalCase, clock_cases, geometry_cases, rounding_cases
 from docs.make.sensor_cases import detection_cases, optical_cases
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say, say_lines
 
 PAGE = Path(__file__).parents[1] / "numerics.md"
@@ -109,5 +109,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

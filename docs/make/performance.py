@@ -28,7 +28,7 @@ from docs.make.performance_queues import VARIANTS
 from dsa_des.files.input_files import read_input_text
 from dsa_des.files.output_file import write_file
 from dsa_des.record.run_folder import write_json
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 PAGE, ROWS = "performance.md", "performance.json"
@@ -220,5 +220,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

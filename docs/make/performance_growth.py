@@ -13,10 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from components.benchmark.measure import pin_to_one_processor
-from components.benchmark.scenes import CASES, engine_run, peak_mb, replicas_of, scene_of
+from components.benchmark.scenes import (
+    CASES,
+    load_case_scene,
+    peak_memory_mb,
+    random_phase_replicas,
+    time_engine_run,
+)
 from dsa_des.record.sinks import MemorySink
 from dsa_des.scene.scene import Scene
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say, say_json
 
 #: What grows, its values, and the overrides of the scene that a value stands for.
@@ -58,29 +64,31 @@ def point(axis: str, value: float) -> dict[str, Any]:
     pin_to_one_processor()
     scene, scenes = _scenes(axis, value)
     to_disk = axis in ("simulated time, s", "replicas")
-    runs = [engine_run(scene, scenes, None if to_disk else MemorySink()) for _ in range(_REPEATS)]
+    runs = [
+        time_engine_run(scene, scenes, None if to_disk else MemorySink()) for _ in range(_REPEATS)
+    ]
     cpu_s, units = min((run_s, units) for _, run_s, units in runs)
     return {
         "axis": axis,
         "value": value,
         "cpu_s": cpu_s,
         "ns_per_target_scan": 1e9 * cpu_s / units,
-        "peak_memory_mb": peak_mb(),
+        "peak_memory_mb": peak_memory_mb(),
     }
 
 
 def _scenes(axis: str, value: float) -> tuple[Scene, list[Scene]]:
     cases = {case.name: case for case in CASES}
     if axis == "replicas":
-        scene = scene_of(cases["monte_carlo"], quick=False)
-        return scene, replicas_of(scene, int(value)) if value > 1 else []
+        scene = load_case_scene(cases["monte_carlo"], quick=False)
+        return scene, random_phase_replicas(scene, int(value)) if value > 1 else []
     rates = [f"blocks.{name}.scan_rate_hz={value:g}" for name in ("radar", "eo", "ir")]
     sets = {
         "intruders": ["duration_s=60", f"blocks.traffic.intruders={value:g}"],
         "scan rate, Hz": ["duration_s=120", *rates],
         "simulated time, s": [f"duration_s={value:g}", "blocks.traffic.intruders=4"],
     }[axis]
-    return scene_of(cases["hundred"], quick=False, sets=tuple(sets)), []
+    return load_case_scene(cases["hundred"], quick=False, sets=tuple(sets)), []
 
 
 def draw(rows: list[dict[str, Any]], path: Path) -> None:
@@ -122,5 +130,5 @@ def draw(rows: list[dict[str, Any]], path: Path) -> None:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -13,7 +13,7 @@ from typing import Any
 
 from components.benchmark.measure import pin_to_one_processor
 from components.benchmark.scenes import CLOCKED
-from components.examples import folder
+from components.examples import configs_folder
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder
 from dsa_des.running.simulation import Simulation
@@ -58,7 +58,7 @@ def measured(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     sets = [f"blocks.{name}.processor=cpu" for name in variant.blocks]
     if sets:
         sets += ["processors.cpu.service_s=0.005", *variant.more]
-    scene = load_scene(folder() / "first_light.toml", sets=sets, duration_s="120")
+    scene = load_scene(configs_folder() / "first_light.toml", sets=sets, duration_s="120")
     rates = []
     for _ in range(2 if quick else 2 + 2 * repeats):
         with tempfile.TemporaryDirectory() as place:

@@ -27,7 +27,7 @@ from dsa_des.scene.examples import find_example
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.study import changed_scene
 from dsa_des.studies.study_file import read_study
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 STUDY = "radar_dwell"
 FIGURE = "scan_rate.png"
@@ -268,5 +268,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from components.arguments.checks import FloatArray
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 NAME = "S42W180.hgt"
@@ -56,5 +56,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

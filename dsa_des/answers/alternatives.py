@@ -57,7 +57,9 @@ class Alternatives:
 
 
 def make_comparable_study(study: Study) -> tuple[Study, list[str]]:
-    """Return a study whose runs can be paired with those of other models, and notes on changes."""
+    """Return a copy of the study that runs the same replicas with every model (without
+    ``[accuracy]``, allocate and stop_when), and a note on each setting left out.
+    """
     notes = []
     base = study.base.copy()
     chosen = base.data.pop(_CHOOSES_BY_ITSELF, None) is not None
@@ -96,7 +98,7 @@ def find_alternatives(
     `listed` are texts ``KEY=VALUE`` or ``KEY=[VALUE, ...]``, as ``--set`` and axes have them.
     """
     found = Alternatives([], [], [], [])
-    cells = _cells_of_all_values(study)
+    cells = _cells_covering_axis_values(study)
     scenes = {cell: study.scene(cell) for cell in cells}
     known = {name for scene in scenes.values() for name in scene.blocks}
     if block is not None and block not in known:
@@ -113,20 +115,20 @@ def find_alternatives(
             except Unavailable as error:
                 found.unavailable.append((label, str(error)))
                 continue
-            _sort_alternative(study, alternative, cells, answers, found)
+            _classify_alternative(study, alternative, cells, answers, found)
     for text in listed:
         before = len(found.unavailable)
-        some = _list_alternatives(study, text, scenes[cells[0]], fixed)
+        some = _parse_vary_option(study, text, scenes[cells[0]], fixed)
         for alternative in some:
-            _sort_alternative(study, alternative, cells, answers, found)
+            _classify_alternative(study, alternative, cells, answers, found)
         wrong = found.unavailable[before:]
         if len(wrong) == len(some):
             raise UsageError(f"--vary {text}: {wrong[0][1]}")
     return found
 
 
-def _cells_of_all_values(study: Study) -> list[int]:
-    """Return cells that hold every value of every axis but those that are a sample."""
+def _cells_covering_axis_values(study: Study) -> list[int]:
+    """Return cell numbers that cover every value of every axis (of a sampled axis, the first)."""
     sampled = [k for k, axis in enumerate(study.axes) if axis.column in study.over]
     return [
         cell
@@ -138,7 +140,9 @@ def _cells_of_all_values(study: Study) -> list[int]:
 def _effective_ladders(
     study: Study, scenes: Mapping[int, Scene], block: str | None, found: Alternatives
 ) -> list[tuple[str, Ladder, list[dict[str, Any]]]]:
-    """Return ladders that change something, with the tables of their block in all scenes."""
+    """Return (block name, ladder, the block's parameter table in each scene) for every ladder that
+    makes a difference in some scene, and add a note to `found` on each other one.
+    """
     declared: dict[tuple[str, str], Ladder] = {}
     why: dict[tuple[str, str], str] = {}
     tables: dict[tuple[str, str], list[dict[str, Any]]] = {}
@@ -167,7 +171,9 @@ def _effective_ladders(
 def _rung_as_alternative(
     study: Study, label: str, block: str, ladder: Ladder, rung: Rung, tables: list[dict[str, Any]]
 ) -> Alternative:
-    """Return a rung as changes of a scene; Unavailable where one change is not enough for all."""
+    """Return a rung as an `Alternative` that sets its parameters in the block; raise Unavailable if
+    the scenes would need different settings.
+    """
     for key in ladder.clears:
         written = study.base.data["blocks"].get(block, {}).get(key)
         if any(table.get(key) not in (None, _AUTO) for table in tables):
@@ -175,7 +181,7 @@ def _rung_as_alternative(
                               f"--vary blocks.{block}.{key}=... varies it")  # fmt: skip
         if written == _AUTO:
             del study.base.data["blocks"][block][key]
-    changes = [rung.changes(table) for table in tables]
+    changes = [rung.parameters_to_set(table) for table in tables]
     if any(one != changes[0] for one in changes):
         raise Unavailable("it is set otherwise at other values of the study's axes")
     sets = [(f"blocks.{block}.{key}", value) for key, value in changes[0].items()]
@@ -188,10 +194,12 @@ def _rung_as_alternative(
     return Alternative(label, tuple(sets), ((block, rung.type_name),) * bool(rung.type_name))
 
 
-def _list_alternatives(
+def _parse_vary_option(
     study: Study, text: str, scene: Scene, fixed: Mapping[Key, str]
 ) -> list[Alternative]:
-    """Return what a user lists: the values of one key, or types of one block."""
+    """Return one alternative for each value in the text of one ``--vary`` option; raise UsageError
+    if it is invalid or sets a key that the study varies.
+    """
     parsed = parse_assignment(text, "--vary")
     if isinstance(parsed, Problem):
         raise SceneError([parsed])
@@ -240,11 +248,13 @@ def _refuse_varied_keys(study: Study, alternative: Alternative, fixed: Mapping[K
             raise Unavailable(f"{fixed[key]} sets it")
 
 
-def _sort_alternative(
+def _classify_alternative(
     study: Study, alternative: Alternative, cells: Sequence[int], answers: Sequence[str],
     found: Alternatives,
 ) -> None:  # fmt: skip
-    """Set a model up in every scene, and put it where it belongs."""
+    """Build a model's scenes and add it to `found`: as unavailable, as equal to the scene's own, as
+    a new model, or as a note that it equals an earlier one.
+    """
     two = add_model_axis(study, [alternative])
     owns, others = [], []
     for cell in cells:

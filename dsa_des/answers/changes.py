@@ -58,7 +58,7 @@ class PairedChange:
 
     @property
     def half_width(self) -> float:
-        """How far the interval reaches from the difference, at most."""
+        """The larger distance from the estimate to an end of its confidence interval."""
         low, value, high = self.difference.low, self.difference.value, self.difference.high
         return max(high - value, value - low)
 
@@ -71,7 +71,7 @@ class PairedChange:
 
 
 def confidence_per_interval(confidence: float, comparisons: int) -> float:
-    """Return how sure each of some intervals must be for all to hold together."""
+    """Return the confidence each of `comparisons` intervals needs for `confidence` (Bonferroni)."""
     return 1.0 - (1.0 - confidence) / max(1, comparisons)
 
 
@@ -97,7 +97,7 @@ def _estimate_change(
     rows: Rows, result: Result, model: str, at: tuple[Any, ...], own: Estimate,
     sides: tuple[IntArray, IntArray], confidence: float,
 ) -> PairedChange:  # fmt: skip
-    pair = rows.common(*sides)
+    pair = rows.pair_rows_by_run(*sides)
     runs = len(pair[0])
     differing = np.zeros(runs, dtype=bool)
     for one, other in _paired_columns(rows, result, pair):
@@ -131,7 +131,9 @@ def _estimate_change(
 def _paired_difference(
     rows: Rows, result: Result, pair: tuple[IntArray, IntArray], confidence: float
 ) -> tuple[EstimatedDifference, str, float]:
-    """Return the paired difference, why there is none, and the events a ratio rests on if few."""
+    """Return the paired difference, the reason why a risk ratio cannot be computed (else empty),
+    and the number of events if these are too few (else infinity).
+    """
     # Student's t also where the study's own means are bootstrapped: so many comparisons ask for
     # ends farther out than its resamples reach.
     found = rows.difference(result, *pair, confidence, "t")
@@ -146,10 +148,10 @@ def _paired_difference(
 def _paired_columns(
     rows: Rows, result: Result, pair: tuple[IntArray, IntArray]
 ) -> Iterator[tuple[AnyArray, AnyArray]]:
-    """Give the columns that a result is made of, for both sides of all pairs of runs."""
+    """Yield each column a result needs: its values in the first and second run of every pair."""
     names: tuple[str, ...] = (result.name,)
     if result.ratio is not None:
-        names = result.ratio.reads()
+        names = result.ratio.columns_read()
     elif result.kind == SHARE:
         names = result.name, result.name + TRIALS
     for name in names:

@@ -9,7 +9,7 @@ from dsa_des.answers.report import AnswerReport
 from dsa_des.answers.verdicts import ModelVerdict
 from dsa_des.block.mark import RED
 from dsa_des.costs.cost_report import Label, put_labels
-from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, set_plain_log_ticks
 from dsa_des.results.labels import unit_of
 
 _GREY, _ALLOWED = "#777777", "#e4efe4"
@@ -78,7 +78,7 @@ def _draw_panel(axes: Any, report: AnswerReport, name: str) -> list[Label]:
     axes.set_xlabel("CPU, by that of the scene as it is")
     unit = unit_of(name)
     axes.set_ylabel("change, by the limit" if by_limit else f"change{f' ({unit})' if unit else ''}")
-    plain_log_ticks(axes.xaxis)
+    set_plain_log_ticks(axes.xaxis)
     return labels
 
 

@@ -28,8 +28,9 @@ Batch = list[tuple[int, int, int]]
 _FEWEST, _MOST = 5, 16
 
 
-def split_into_turns(study: Study, many: int | None = None) -> list[Batch]:
-    """Return the batches of a study: of its members where it runs over a sample, or of replicas.
+def split_into_batches(study: Study, many: int | None = None) -> list[Batch]:
+    """Split the runs of a study, whose last axis is the models, into batches of sampled encounters
+    or, where there are more replicas than those, of replicas.
 
     By default each is as large as the study's chunks.
     """
@@ -65,13 +66,13 @@ class TurnTimes:
     cpu_s: dict[tuple[int, int], float] = field(default_factory=dict)
     runs: dict[tuple[int, int], int] = field(default_factory=dict)
 
-    def keep(self, path: Path, turns: int) -> None:
-        """Write the times of turns that are finished, and how many turns there are in all."""
+    def save(self, path: Path, turns: int) -> None:
+        """Write the CPU times measured so far and the planned number of turns to a JSON file."""
         taken = [[*key, self.cpu_s[key], self.runs[key]] for key in sorted(self.runs)]
         write_file(path, json.dumps({"turns": turns, "taken": taken}).encode())
 
     def read_earlier(self, path: Path) -> tuple[int, int] | None:
-        """Read what an earlier attempt kept: turns that are finished, and in all; or None."""
+        """Return an earlier attempt's (finished, planned) turns and read its times; else None."""
         try:
             content = json.loads(path.read_bytes())
             turns = int(content["turns"])
@@ -85,14 +86,16 @@ class TurnTimes:
             raise UsageError(f"{path}: {said}") from error
         return 1 + max(self.runs)[0], turns
 
-    def per_run_ms(self, model: int) -> tuple[float, float]:
-        """Return the median over turns, and half the distance between the quartiles."""
+    def cpu_ms_per_run(self, model: int) -> tuple[float, float]:
+        """Return a model's CPU time per run, ms: median and half interquartile range of turns."""
         each = [1e3 * self.cpu_s[key] / self.runs[key] for key in sorted(self.cpu_s)
                 if key[1] == model]  # fmt: skip
         return median_and_spread(each)
 
-    def of_own(self, model: int) -> tuple[float, float]:
-        """Return a model's time by that of the scene as it is, in the turns that both have."""
+    def cpu_ratio_to_own(self, model: int) -> tuple[float, float]:
+        """Return a model's CPU time per run divided by that of the scene as it is: the median over
+        the turns that have both, and half the interquartile range.
+        """
         turns = sorted(turn for turn, of in self.cpu_s if of == model and (turn, 0) in self.cpu_s)
         each = [
             (self.cpu_s[turn, model] / self.runs[turn, model])
@@ -113,13 +116,14 @@ def run_in_turns(
     after: Callable[[int], Sequence[int]],
     done: int = 0,
 ) -> None:
-    """Run all models of a study, whose last axis they are, into its open folder.
+    """Run every model of a study, one batch of runs after the other; write results into the study's
+    open folder and CPU times into `turn_times`.
 
     `begun` is told how long the scene as it is took in the first turn; `after` is told after each
     turn how many are done, and returns the models to go on with. `turn_times` is filled on the way;
     it holds those of turns that were `done` before.
     """
-    models, parts = len(study.axes[-1].labels), folder.destination
+    models, parts = len(study.axes[-1].labels), folder.parts_destination
 
     def chunks(turn: int, some: Sequence[int]) -> Iterator[Chunk]:
         for model in some:

@@ -21,7 +21,7 @@ from dsa_des.answers.verdicts import (
     judge_model,
 )
 from dsa_des.results.labels import round_to_interval, short_text, unit_of
-from dsa_des.results.printing import round_estimate
+from dsa_des.results.printing import rounded_value_and_interval
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
@@ -58,7 +58,7 @@ class AnswerReport:
 
     def __post_init__(self) -> None:
         self.costs = {
-            name: self.turn_times.of_own(k) for k, name in enumerate(self.models, start=1)
+            name: self.turn_times.cpu_ratio_to_own(k) for k, name in enumerate(self.models, start=1)
         }
         cheap = {name: cost for name, (cost, _) in self.costs.items()}
         #: Result → the verdicts of all models, in their order.
@@ -79,9 +79,11 @@ class AnswerReport:
 
     # -- the table ----------------------------------------------------------------------------
 
-    def cells(self, name: str) -> Iterator[list[str]]:
-        """Give the cells of the table of a result, as `HEADS` names them."""
-        own_ms, spread_ms = self.turn_times.per_run_ms(0)
+    def table_rows(self, name: str) -> Iterator[list[str]]:
+        """Yield the rows of one result's table as lists of texts under the headings `HEADS`: first
+        the scene as it is, then each model.
+        """
+        own_ms, spread_ms = self.turn_times.cpu_ms_per_run(0)
         yield [
             AS_IT_IS,
             f"{_format_plus_minus(own_ms, spread_ms)} ms a run",
@@ -94,7 +96,7 @@ class AnswerReport:
             if change is None or verdict.kind == NOTHING:
                 yield [verdict.model, cost, "", "", "", "", f"{said}: {verdict.reason}"]
                 continue
-            value, interval = round_estimate(change.difference)
+            value, interval = rounded_value_and_interval(change.difference)
             yield [
                 verdict.model, cost, value, interval,
                 "" if change.identical else self._location_text(change),
@@ -118,7 +120,7 @@ class AnswerReport:
         rows = []
         for change in self.changes:
             verdict, d = by[change.model, change.result.name], change.difference
-            per_run, _ = self.turn_times.per_run_ms(numbers[change.model])
+            per_run, _ = self.turn_times.cpu_ms_per_run(numbers[change.model])
             cost, spread = self.costs[change.model]
             rows.append(
                 {
@@ -130,7 +132,7 @@ class AnswerReport:
                     "change": _finite_or_none(d.value), "low": _finite_or_none(d.low),
                     "high": _finite_or_none(d.high),
                     "limit": _finite_or_none(
-                        self.limits[change.result.name].amount_at(change.own.value)
+                        self.limits[change.result.name].absolute_limit(change.own.value)
                     ),
                     "few": d.few, "pairs": d.count, "runs": change.runs,
                     "differing": change.differing, "lost": change.lost, "gained": change.gained,
@@ -157,7 +159,9 @@ class AnswerReport:
         some = self.verdicts[name]
         result = next(one for one in self.results if one.name == name)
         lines = [self._result_text(result)]
-        taken = sorted((v for v in some if v.is_acceptable), key=lambda v: self._cost(v.model))
+        taken = sorted(
+            (v for v in some if v.is_acceptable), key=lambda v: self._cost_or_infinity(v.model)
+        )
         limit = self._limit_text(name)
         sure = f"{100 * self.confidence:g} %"
         if taken:
@@ -165,13 +169,22 @@ class AnswerReport:
                          f"all, each alone: {len(taken)} of {len(some)} models.")  # fmt: skip
         else:
             lines.append(f"No model is surely within {limit}.")
-        lines.append(self._cheapest(taken))
-        lines += self._list_kind(taken, WITHIN, "Within it:", self._within_text)
-        lines += self._list_kind(taken, SAME, self._explain_sameness(taken), self._cost_text)
-        lines += self._list_kind(some, BEYOND, f"Surely changed by more than {limit}, or no longer "
-                               "there:", self._beyond_text)  # fmt: skip
-        lines += self._list_kind(some, OPEN, f"Not told by so many {self.unit}:", self._open_text)
-        lines += self._list_kind(some, NOTHING, "Not compared:", lambda verdict: verdict.reason)
+        lines.append(self._cheapest_model_text(taken))
+        lines += self._sentence_on_verdict_kind(
+            taken, WITHIN, "Within it:", self._within_limit_text
+        )
+        lines += self._sentence_on_verdict_kind(
+            taken, SAME, self._explain_sameness(taken), self._cost_text
+        )
+        lines += self._sentence_on_verdict_kind(some, BEYOND,
+        f"Surely changed by more than {limit}, or no longer "
+                               "there:", self._beyond_limit_text)  # fmt: skip
+        lines += self._sentence_on_verdict_kind(
+            some, OPEN, f"Not told by so many {self.unit}:", self._undecided_text
+        )
+        lines += self._sentence_on_verdict_kind(
+            some, NOTHING, "Not compared:", lambda verdict: verdict.reason
+        )
         return [line for line in lines if line]
 
     def _result_text(self, result: Result) -> str:
@@ -180,7 +193,7 @@ class AnswerReport:
             return f"{result.name}: no model has runs to compare."
         texts = []
         for at, change in owns.items():
-            value, interval = round_estimate(change.own)
+            value, interval = rounded_value_and_interval(change.own)
             where = f" where {self._location_text(change)}" if at else ""
             texts.append(f"{value} ({interval.rstrip(' *') or 'no interval'}){where}")
         shown = texts if len(texts) <= _MOST_NAMED else [*texts[:_MOST_NAMED], "..."]
@@ -196,53 +209,57 @@ class AnswerReport:
         if not limit.is_share:
             return f"{short_text(limit.amount)} {unit}".strip()
         text = f"{100 * limit.amount:g} %"
-        amounts = {limit.amount_at(c.own.value) for c in self.changes if c.result.name == name}
+        amounts = {limit.absolute_limit(c.own.value) for c in self.changes if c.result.name == name}
         known = sorted(amount for amount in amounts if amount == amount)
         if not known:
             return text
         ends = dict.fromkeys(_format_three_digits(amount) for amount in (known[0], known[-1]))
         return f"{text} of it ({' to '.join(ends)}{f' {unit}' if unit else ''})"
 
-    def _cost(self, model: str) -> float:
+    def _cost_or_infinity(self, model: str) -> float:
         cost = self.costs[model][0]
         return cost if cost == cost else math.inf
 
     def _cost_text(self, verdict: ModelVerdict) -> str:
-        return f"{self._cost(verdict.model):.2g} of the CPU"
+        return f"{self._cost_or_infinity(verdict.model):.2g} of the CPU"
 
-    def _within_text(self, verdict: ModelVerdict) -> str:
+    def _within_limit_text(self, verdict: ModelVerdict) -> str:
         assert verdict.change is not None
         return f"{format_change(verdict.change)}, {self._cost_text(verdict)}"
 
     def _explain_sameness(self, taken: Sequence[ModelVerdict]) -> str:
-        """Return what it means that every run gave the same, for as many as there were."""
+        """Return text that opens the sentence on models whose runs were all the same: how many
+        runs, and how rarely a run could still differ.
+        """
         runs = min((v.change.runs for v in taken if v.kind == SAME and v.change), default=0)
         least = -runs / math.log((1.0 - self.confidence) / max(1, self.comparisons))
         rare = f" (as sure: at most 1 in {math.floor(least):,} would differ)"
         return f"The same in every run, each of {runs:,} here{rare if least >= 2.0 else ''}:"
 
-    def _cheapest(self, taken: Sequence[ModelVerdict]) -> str:
+    def _cheapest_model_text(self, taken: Sequence[ModelVerdict]) -> str:
         if not taken:
             return ""
         cheapest = taken[0]
         cost, spread = self.costs[cheapest.model]
         front = [v for v in self.verdicts[cheapest.result.name] if v.on_front]
-        front.sort(key=lambda verdict: self._cost(verdict.model))
-        named = "; ".join(f"{v.model} ({self._bound_text(v)})" for v in front)
+        front.sort(key=lambda verdict: self._cost_or_infinity(verdict.model))
+        named = "; ".join(f"{v.model} ({self._cost_and_bound_text(v)})" for v in front)
         its = f" Front, cheapest first: {named}; as it is." if front else ""
         if cost + spread < 1.0 / 1.1:
             return f"The cheapest is {cheapest.model}, at {cost:.2g} of the scene's CPU.{its}"
         return f"None of them surely saves a tenth of the CPU.{its}"
 
-    def _bound_text(self, verdict: ModelVerdict) -> str:
-        """Return what a model costs, and by how much it changes the result at most."""
+    def _cost_and_bound_text(self, verdict: ModelVerdict) -> str:
+        """Return text with a model's CPU cost relative to the scene's own and the largest change of
+        the result that the intervals leave possible.
+        """
         unit = unit_of(verdict.result.name)
         mine = [c.largest_possible_change for c in self.changes
                 if (c.model, c.result.name) == (verdict.model, verdict.result.name)]  # fmt: skip
         most = _format_three_digits(max(mine))
-        return f"{self._cost(verdict.model):.2g}, at most {most} {unit}".rstrip()
+        return f"{self._cost_or_infinity(verdict.model):.2g}, at most {most} {unit}".rstrip()
 
-    def _list_kind(
+    def _sentence_on_verdict_kind(
         self, some: Sequence[ModelVerdict], kind: str, words: str, text: Any
     ) -> list[str]:
         models: dict[str, list[str]] = {}
@@ -252,7 +269,7 @@ class AnswerReport:
         named = "; ".join(f"{', '.join(those)} ({said})" for said, those in models.items())
         return [f"{words} {named}."] if models else []
 
-    def _beyond_text(self, verdict: ModelVerdict) -> str:
+    def _beyond_limit_text(self, verdict: ModelVerdict) -> str:
         change = verdict.change
         assert change is not None
         parts = (
@@ -263,7 +280,7 @@ class AnswerReport:
         where = self._location_text(change)
         return ", ".join(parts) + (f" where {where}" if where else "")
 
-    def _open_text(self, verdict: ModelVerdict) -> str:
+    def _undecided_text(self, verdict: ModelVerdict) -> str:
         change, wanted = verdict.change, verdict.wanted
         assert change is not None
         parts = [
@@ -286,7 +303,9 @@ class AnswerReport:
         return ", ".join(parts)
 
     def notes_on_tables(self) -> list[str]:
-        """Return what holds for all tables: how sure, how measured, and what was left out."""
+        """Return the lines that are printed below all tables: how sure the intervals are, how CPU
+        time was measured, and which models could not be compared.
+        """
         each = 100 * confidence_per_interval(self.confidence, self.comparisons)
         turns = len({turn for turn, _ in self.turn_times.cpu_s})
         lines = [
@@ -345,7 +364,7 @@ def print_report(report: AnswerReport) -> None:
     console = terminal.console(160)
     for result in report.results:
         console.print()
-        rows = list(report.cells(result.name))
+        rows = list(report.table_rows(result.name))
         last = len(HEADS) - 1
         print_table(console, report.title_of(result.name), HEADS, rows, below=last, right=(1, 2, 3))
         console.print()

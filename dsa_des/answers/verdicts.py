@@ -38,8 +38,8 @@ class Limit:
     amount: float
     is_share: bool
 
-    def amount_at(self, answer: float) -> float:
-        """Return the limit as an amount, given the scene's own answer."""
+    def absolute_limit(self, answer: float) -> float:
+        """Return the largest allowed change: a share of absolute `answer`, or a fixed amount."""
         return self.amount * abs(answer) if self.is_share else self.amount
 
 
@@ -101,16 +101,19 @@ class ModelVerdict:
 def judge_model(
     model: str, result: Result, changes: Sequence[PairedChange], limit: Limit, failed: str
 ) -> ModelVerdict:
-    """Return the verdict on a model; `failed` says why some runs gave no result."""
+    """Return the verdict on a model by the worst of `changes`; `failed` says why runs failed."""
     if not changes:
         return ModelVerdict(
             model, result, NOTHING, None, math.nan, math.nan, failed or "no run of both"
         )
-    limits = [limit.amount_at(change.own.value) for change in changes]
-    judged = [_judge_change(change, most) for change, most in zip(changes, limits, strict=True)]
+    limits = [limit.absolute_limit(change.own.value) for change in changes]
+    judged = [_verdict_kind(change, most) for change, most in zip(changes, limits, strict=True)]
     # The worst is told: what is surely beyond, then what is not known, then what weighs most.
     order = (BEYOND, NOTHING, OPEN, WITHIN, SAME)
-    sizes = [_relative_size(change, most) for change, most in zip(changes, limits, strict=True)]
+    sizes = [
+        _change_relative_to_limit(change, most)
+        for change, most in zip(changes, limits, strict=True)
+    ]
     k = min(range(len(judged)), key=lambda k: (order.index(judged[k]), -sizes[k]))
     kind, change, most = judged[k], changes[k], limits[k]
     weights = [
@@ -122,7 +125,7 @@ def judge_model(
     return ModelVerdict(model, result, kind, change, most, weight, change.reason, wanted)
 
 
-def _judge_change(change: PairedChange, limit: float) -> str:
+def _verdict_kind(change: PairedChange, limit: float) -> str:
     interval = change.difference
     if change.reason:
         return NOTHING
@@ -150,7 +153,7 @@ def _relative_to_limit(amount: float, limit: float) -> float:
     return amount / limit if limit > 0.0 else math.inf
 
 
-def _relative_size(change: PairedChange, limit: float) -> float:
+def _change_relative_to_limit(change: PairedChange, limit: float) -> float:
     size = _relative_to_limit(abs(change.difference.value), limit)
     return size if size == size else math.inf
 
@@ -178,7 +181,8 @@ def _units_needed(change: PairedChange, limit: float) -> float:
 
 
 def is_on_cost_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> list[bool]:
-    """Return which models no other beats: as cheap, and surely changing as little.
+    """Return for each verdict whether its model is on the front of CPU cost against largest
+    possible change: no other model is at least as good in both and better in one.
 
     The scene as it is, of cost 1, changes nothing, and who is its equal is not better; costs that
     differ by less than a tenth are one.
@@ -195,6 +199,6 @@ def is_on_cost_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float
 
 
 def format_change(change: PairedChange) -> str:
-    """Return ``+1,240 ± 130 m``."""
+    """Return a change as text with its interval and unit, such as ``+1,240 ± 130 m``."""
     unit = unit_of(change.result.name)
     return f"{format_with_interval(change.difference.value, change.half_width)} {unit}".strip()

@@ -65,18 +65,18 @@ def instants_to_seconds(values: Any) -> Any:
     return values.ticks / values.ticks_per_s if isinstance(values, Instants) else values
 
 
-def null_column(rows: int) -> AnyArray:
-    """Return a float64 column that is null in all rows: one NaN, seen `rows` times."""
+def null_float_column(rows: int) -> AnyArray:
+    """Return a float64 column of `rows` NaN values, which are stored once."""
     return _NANS[:rows]
 
 
-def is_empty(values: Any) -> bool:
-    """Return whether a column is known to be null in all rows, without a look at them."""
+def is_null_column(values: Any) -> bool:
+    """Return whether a column is the shared NaN column (all rows null); values are not examined."""
     return isinstance(values, np.ndarray) and values.base is _NAN
 
 
 def has_same_bits(some: AnyArray, others: AnyArray) -> bool:
-    """Return whether two columns are the same, NaN and the sign of 0 too; differing ends tell."""
+    """Return whether two columns are equal bit by bit: NaN equals NaN, 0.0 is not -0.0."""
     if some.dtype != others.dtype or len(some) != len(others):
         return False
     bits = _BITS[some.itemsize]
@@ -86,8 +86,8 @@ def has_same_bits(some: AnyArray, others: AnyArray) -> bool:
     return not (some.strides[0] or others.strides[0]) or bool((some == others).all())
 
 
-def holds_only(values: AnyArray, one: AnyArray) -> bool:
-    """Return whether all rows hold what `one` (1,) does, NaN and the sign of 0 too."""
+def has_only_value(values: AnyArray, one: AnyArray) -> bool:
+    """Return whether all rows have the bits of `one`, shape (1,); NaN equals NaN, 0.0 not -0.0."""
     if values.dtype != one.dtype:
         return False
     bits = _BITS[one.itemsize]
@@ -98,7 +98,7 @@ def holds_only(values: AnyArray, one: AnyArray) -> bool:
 
 
 def constant_column(value: Any, rows: int, kind: Any) -> AnyArray:
-    """Return a column that holds the same in all rows: one value or array, seen `rows` times."""
+    """Return a read-only column of `rows` times `value`, stored once (stride 0)."""
     one = np.array(value, dtype=kind)
     one.flags.writeable = False
     shape, strides = (rows, *one.shape), (0, *one.strides)
@@ -106,27 +106,27 @@ def constant_column(value: Any, rows: int, kind: Any) -> AnyArray:
     return column
 
 
-def is_constant(values: AnyArray) -> bool:
-    """Return whether a column is known to hold the same in all rows, without a look at them."""
+def is_stored_once(values: AnyArray) -> bool:
+    """Return whether a column stores one value for all rows (stride 0), not equal values by row."""
     return not values.strides[0]
 
 
-def first_row_if_constant(values: AnyArray) -> AnyArray:
-    """Return one row of what is known to hold the same in all rows; other values as they are."""
+def first_row_if_stored_once(values: AnyArray) -> AnyArray:
+    """Return the first row of a column with one stored value (stride 0); others unchanged."""
     return values if values.strides[0] else values[:1]
 
 
-def constant_if_equal(values: AnyArray) -> AnyArray:
-    """Return a column that holds the same in all of many rows as `constant`; others as they are."""
+def store_once_if_equal(values: AnyArray) -> AnyArray:
+    """Return a long column of equal rows as one stored value; return other columns unchanged."""
     if len(values) < _MANY:
         return values
-    same = holds_only(values, values[:1])
+    same = has_only_value(values, values[:1])
     return constant_column(values[0], len(values), values.dtype) if same else values
 
 
 def take_rows(values: AnyArray, rows: IntArray) -> AnyArray:
-    """Return some rows of a column; of one that is constant, without a look at them."""
-    if len(values) and is_constant(values):
+    """Return a column's rows at the indices; one stored value stays one stored value."""
+    if len(values) and is_stored_once(values):
         if len(rows) <= len(values):  # a part of it is made in no time
             return values[: len(rows)]
         return constant_column(values[0], len(rows), values.dtype)
@@ -134,7 +134,7 @@ def take_rows(values: AnyArray, rows: IntArray) -> AnyArray:
 
 
 def pick_rows(value: Any, rows: slice | IntArray) -> Any:
-    """Return some rows of an array, of a dict of arrays, or of what has `take_rows`."""
+    """Return given rows of an array, dict of arrays or object with `take_rows`; None stays None."""
     if value is None:
         return None
     if value.__class__ is np.ndarray:  # nearly all are, and looking for a method costs more
@@ -147,7 +147,7 @@ def pick_rows(value: Any, rows: slice | IntArray) -> Any:
 
 
 def join_values(values: list[Any], counts: list[int]) -> Any:
-    """Return values of parts of so many rows one after the other; nulls where a part has none."""
+    """Return the parts' values joined; a part that is None becomes as many nulls as in `counts`."""
     if {*map(type, values)} == {np.ndarray}:  # nearly all are
         return np.concatenate(values)
     known = next((value for value in values if value is not None), None)

@@ -5,8 +5,10 @@ import numpy as np
 from dsa_des.arrays.types import BoolArray, IntArray
 
 
-def offsets_of(row: IntArray, rows: int) -> IntArray:
-    """Return the offsets of entries (rows + 1,), given each entry's row, ascending."""
+def offsets_from_entry_rows(row: IntArray, rows: int) -> IntArray:
+    """Return the offsets (rows + 1,) of entries, given the ascending row number of each entry: row
+    i has the entries from offsets[i] to before offsets[i + 1].
+    """
     count = len(row)
     if count == 0:
         return np.zeros(rows + 1, dtype=np.int64)
@@ -17,8 +19,8 @@ def offsets_of(row: IntArray, rows: int) -> IntArray:
     return np.arange(count + 1).repeat(gaps)
 
 
-def cells_of(mask: BoolArray) -> tuple[IntArray, IntArray]:
-    """Return row and column of what is true, row by row; several times as fast as `nonzero`."""
+def rows_and_columns_of_true(mask: BoolArray) -> tuple[IntArray, IntArray]:
+    """Return row and column indices of the True elements of a 2-D mask, row by row."""
     cell, width = mask.ravel().nonzero()[0], mask.shape[1]
     if len(mask) == 1:
         return np.zeros(len(cell), dtype=np.int64), cell
@@ -28,16 +30,16 @@ def cells_of(mask: BoolArray) -> tuple[IntArray, IntArray]:
     return row, cell - row * width
 
 
-def row_of_entries(offsets: IntArray) -> IntArray:
-    """Return the row of each entry; where none has two, much faster than repeating them."""
+def rows_of_entries(offsets: IntArray) -> IntArray:
+    """Return the row number of each entry, given the offsets (rows + 1,) of the rows."""
     counts = offsets[1:] - offsets[:-1]
     if counts.max(initial=0) > 1:
         return np.arange(len(counts)).repeat(counts)
     return (counts > 0).nonzero()[0]
 
 
-def entries_of(offsets: IntArray, rows: slice | IntArray) -> tuple[IntArray, slice | IntArray]:
-    """Return the offsets of some rows by themselves, and which entries are theirs."""
+def select_entries(offsets: IntArray, rows: slice | IntArray) -> tuple[IntArray, slice | IntArray]:
+    """Return offsets, from 0, of selected rows, and their entries' indices (slice if `rows` is)."""
     if isinstance(rows, slice):
         start, stop, _ = rows.indices(len(offsets) - 1)
         stop = max(start, stop)

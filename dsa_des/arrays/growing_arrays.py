@@ -25,7 +25,7 @@ class GrowingArray:
         #: How much of the room is taken by the longest that shares it.
         self._taken = [values.shape[-1]] if taken is None else taken
 
-    def with_more(self, values: AnyArray) -> GrowingArray:
+    def with_appended(self, values: AnyArray) -> GrowingArray:
         """Return an array with more values at its end."""
         begin = self.values.shape[-1]
         end = begin + values.shape[-1]
@@ -41,13 +41,13 @@ class GrowingArray:
 class Growing:
     """What holds such arrays as attributes."""
 
-    def with_more(self, **more: AnyArray) -> Self:
-        """Return a copy of which some arrays have more at their end."""
+    def with_appended(self, **more: AnyArray) -> Self:
+        """Return a copy in which the given values are appended to the arrays of these names."""
         rooms: dict[str, Any] = dict(self.__dict__.get("_rooms", {}))
         longer = copy(self)
         for name, values in more.items():
             room = rooms.get(name) or GrowingArray(getattr(self, name))
-            rooms[name] = room.with_more(values)
+            rooms[name] = room.with_appended(values)
             longer.__dict__[name] = rooms[name].values
         longer.__dict__["_rooms"] = rooms
         return longer

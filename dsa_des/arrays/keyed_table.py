@@ -26,12 +26,12 @@ class KeyedTable:
 
     @property
     def columns(self) -> dict[str, Any]:
-        """All of them by name."""
+        """The columns of the table by name."""
         return self.__dict__
 
     @classmethod
     def from_columns(cls, columns: dict[str, Any]) -> Self:
-        """Return a table of a dict of columns, which it keeps."""
+        """Return a table of the given columns; it uses the dict itself and does not copy it."""
         table = object.__new__(cls)
         table.__dict__ = columns
         return table
@@ -40,14 +40,14 @@ class KeyedTable:
     def empty(
         cls, types: Mapping[str, type], shapes: Mapping[str, tuple[int, ...]] | None = None
     ) -> Self:
-        """Return no things, of columns of some types; `shapes` are those before the last axis."""
+        """Return a table of no rows; columns by type, `shapes` gives axes before the last."""
         shapes = shapes or {}
         return cls.from_columns(
             {n: np.empty((*shapes.get(n, ()), 0), dtype=t) for n, t in types.items()}
         )
 
     def take(self, which: IntArray | BoolArray) -> Self:
-        """Return some of them."""
+        """Return the rows of the table at the given indices, or those where the mask is True."""
         if which.dtype == bool:
             if which.all():
                 return self
@@ -57,7 +57,7 @@ class KeyedTable:
         return self.from_columns({name: v.take(which, -1) for name, v in self.__dict__.items()})
 
     def with_columns(self, **columns: Any) -> Self:
-        """Return the same things with other values."""
+        """Return the table with the given columns replaced or added."""
         return self.from_columns({**self.__dict__, **columns})
 
     @classmethod
@@ -72,33 +72,35 @@ class KeyedTable:
         )
 
     def sort(self) -> Self:
-        """Return the rows sorted by run, stably."""
+        """Return the rows in ascending order of their run; rows of one run keep their order."""
         if bool((self.replica[1:] >= self.replica[:-1]).all()):
             return self
         return self.take(np.argsort(self.replica, kind="stable"))
 
-    def _is_of(self, runs: IntArray) -> bool:
-        """Whether all is of some runs, the usual case: of the only one, or a row of each."""
+    def _has_only_runs(self, runs: IntArray) -> bool:
+        """Return whether rows clearly belong to `runs`: to its only one, or one row for each."""
         replica = self.replica
         if not len(replica) or replica[0] != runs[0] or replica[-1] != runs[-1]:
             return False
         return bool(replica[0] == replica[-1] or np.array_equal(replica, runs))
 
     def rows_of_runs(self, runs: IntArray) -> Self:
-        """Return the rows of some runs, which are in order."""
-        if len(self) == 0 or self._is_of(runs):
+        """Return the rows that belong to one of the given ascending runs."""
+        if len(self) == 0 or self._has_only_runs(runs):
             return self
         return self.take(np.isin(self.replica, runs))
 
     def replace_runs(self, runs: IntArray, newer: Self, first_run: int) -> Self:
-        """Replace the rows of some runs by `newer`; drop runs before the first."""
-        if len(self) == 0 or self._is_of(runs):
+        """Return the table with its rows of `runs` replaced by `newer` and those of runs before
+        `first_run` removed, sorted by run.
+        """
+        if len(self) == 0 or self._has_only_runs(runs):
             return newer.sort()
         others = (self.replica >= first_run) & ~np.isin(self.replica, runs)
         return self.concatenate([self.take(others), newer]).sort()
 
-    def latest_or_new(self, new: Self) -> Self:
-        """Return each run's row: this table's, or the row of `new` where this has none."""
+    def kept_rows_or_new(self, new: Self) -> Self:
+        """Return a row for each run in `new`: this table's if there is one, else that of `new`."""
         old = self.rows_of_runs(new.replica)
         if len(old) == len(new):
             return self.from_columns({name: old.columns[name].copy() for name in new.columns})
@@ -109,8 +111,8 @@ class KeyedTable:
         return self.from_columns(columns)
 
 
-def occurrences_by_turn(keys: IntArray) -> list[IntArray]:
-    """Return the first row of every key, then the second ones, and so on."""
+def indices_by_occurrence(keys: IntArray) -> list[IntArray]:
+    """Return index arrays of each key's first occurrence, then of its second, and so on."""
     if len(keys) == 0 or bool((keys == keys[0]).all()):
         return list(np.arange(len(keys))[:, np.newaxis])
     if bool((keys[1:] > keys[:-1]).all()):  # the usual case: a row of each run

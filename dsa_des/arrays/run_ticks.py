@@ -27,25 +27,25 @@ _MANY = 64
 _LEAST_BITS = 44
 
 
-def runs_of_single(rows: int) -> IntArray:
-    """Return the runs of rows of a single run: 0, seen `rows` times."""
+def single_run_numbers(rows: int) -> IntArray:
+    """Return the run number of `rows` rows of a single run: zeros, which are stored once."""
     return _ZEROS[:rows]
 
 
-def is_single_run(run: IntArray) -> bool:
-    """Return whether runs come from `runs_of_single`."""
+def is_shared_single_run(run: IntArray) -> bool:
+    """Return whether run numbers are the shared zeros of a single run, not merely equal values."""
     return run.base is _ZERO
 
 
 def take_runs(run: IntArray, rows: IntArray) -> IntArray:
-    """Return the runs of some rows."""
-    return runs_of_single(len(rows)) if run.base is _ZERO else run[rows]
+    """Return the run numbers of the rows at the given indices."""
+    return single_run_numbers(len(rows)) if run.base is _ZERO else run[rows]
 
 
 def concatenate_runs(parts: Sequence[IntArray]) -> IntArray:
     """Return the runs of the rows of all parts, one after the other."""
     if all(part.base is _ZERO for part in parts):
-        return runs_of_single(sum(map(len, parts)))
+        return single_run_numbers(sum(map(len, parts)))
     return np.concatenate(parts)
 
 
@@ -73,58 +73,59 @@ class RunTicks:
     @classmethod
     def empty(cls) -> "RunTicks":
         """Return an empty set of instants."""
-        return cls(runs_of_single(0), np.empty(0, dtype=np.int64))
+        return cls(single_run_numbers(0), np.empty(0, dtype=np.int64))
 
     @classmethod
     def of_run(cls, run: int, tick: IntArray) -> "RunTicks":
         """Return instants of one run."""
-        runs = runs_of_single(len(tick)) if run == 0 else np.full(len(tick), run, dtype=np.int64)
+        runs = (
+            single_run_numbers(len(tick)) if run == 0 else np.full(len(tick), run, dtype=np.int64)
+        )
         return cls(runs, tick)
 
     @classmethod
     def concatenate(cls, parts: Sequence["RunTicks"]) -> "RunTicks":
-        """Return the instants of all parts, one after the other, in whatever order that is."""
+        """Return the instants of all parts, one after the other, without sorting them."""
         if len(parts) == 1:
             return parts[0]
         ticks = np.concatenate([part.tick for part in parts])
         return cls(concatenate_runs([part.run for part in parts]), ticks)
 
     def take(self, rows: slice | IntArray | BoolArray) -> "RunTicks":
-        """Return some of them."""
+        """Return the instants at the given indices, in the slice, or where the mask is True."""
         if isinstance(rows, slice):
             count = len(self.tick)
             if rows.indices(count) == (0, count, 1):
                 return self
         tick = self.tick[rows]
         return RunTicks(
-            runs_of_single(len(tick)) if is_single_run(self.run) else self.run[rows], tick
+            single_run_numbers(len(tick)) if is_shared_single_run(self.run) else self.run[rows],
+            tick,
         )
 
-    def part(self, rows: IntArray) -> "RunTicks":
-        """Return some of the instants, ascending, and remember their positions; there are no
-        duplicates.
-        """
+    def take_with_known_positions(self, rows: IntArray) -> "RunTicks":
+        """Return the instants at ascending indices `rows`, and remember these for fast searches."""
         some = self.take(rows)
         self._parts.append((some, rows))
         return some
 
-    def later(self, ticks: int | IntArray) -> "RunTicks":
-        """Return instants of the same runs so much later."""
+    def add_ticks(self, ticks: int | IntArray) -> "RunTicks":
+        """Return instants of the same runs with `ticks` added to their ticks."""
         return RunTicks(self.run, self.tick + ticks)
 
     def count_before_end(self, end: int) -> int:
-        """Return how many there are before a tick, where all are of one run."""
+        """Return how many instants are before the tick `end`; all are of one run and ascending."""
         return len(self.tick) if self.tick[-1] < end else int(self.tick.searchsorted(end))
 
     @property
     def is_one_run(self) -> bool:
-        """Whether all, which are in order, are of one run."""
+        """Whether all instants, which are sorted by run, are of one run."""
         run = self.run
-        return is_single_run(run) or len(run) == 0 or bool(run[0] == run[-1])
+        return is_shared_single_run(run) or len(run) == 0 or bool(run[0] == run[-1])
 
     @property
-    def last_of_each(self) -> IntArray:
-        """The position of the last instant of each run."""
+    def last_position_of_runs(self) -> IntArray:
+        """The index of the last instant of each run, ascending."""
         if len(self) == 0 or self.is_one_run:
             return np.arange(len(self))[-1:]
         # A search for each run: they are far fewer than the instants.
@@ -133,14 +134,14 @@ class RunTicks:
         return ends[np.append(True, ends[1:] != ends[:-1])]
 
     @property
-    def first_of_each(self) -> IntArray:
-        """The position of the first instant of each run."""
+    def first_position_of_runs(self) -> IntArray:
+        """The index of the first instant of each run, ascending."""
         if len(self) == 0 or self.is_one_run:
             return np.zeros(min(1, len(self)), dtype=np.int64)
-        return np.append(0, self.last_of_each[:-1] + 1)
+        return np.append(0, self.last_position_of_runs[:-1] + 1)
 
-    def order(self) -> IntArray | None:
-        """Return what puts them in order, those of one instant as they stand; None if they are."""
+    def sort_indices(self) -> IntArray | None:
+        """Return indices that sort by run and tick, stably; None if sorted already."""
         if len(self) < 2:
             return None
         (key,) = _sortable_keys(self)[0]
@@ -148,8 +149,8 @@ class RunTicks:
             return None
         return np.argsort(key, kind="stable")
 
-    def newest(self) -> "RunTicks":
-        """Return for each the latest instant so far of its run; ticks need be in no order."""
+    def running_latest(self) -> "RunTicks":
+        """Return the largest tick up to each row in its run; runs are sorted, ticks need not be."""
         if self.is_one_run:
             return RunTicks(self.run, np.maximum.accumulate(self.tick))
         # As one number, a tick of a later run is larger than all of the runs before.
@@ -159,19 +160,19 @@ class RunTicks:
             return RunTicks(
                 self.run, np.maximum.accumulate(self.tick - first + of_run) - of_run + first
             )
-        parts = np.split(self.tick, self.first_of_each[1:])
+        parts = np.split(self.tick, self.first_position_of_runs[1:])
         return RunTicks(self.run, np.concatenate([np.maximum.accumulate(p) for p in parts]))
 
     def count_before(self, run: int, tick: int) -> int:
         """Return the number of instants before a tick of a run."""
-        if is_single_run(self.run):
+        if is_shared_single_run(self.run):
             return len(self) if run > 0 else int(np.searchsorted(self.tick, tick))
         first, last = np.searchsorted(self.run, [run, run + 1]).tolist()
         return int(first + np.searchsorted(self.tick[first:last], tick))
 
 
 def _is_same_run(parts: Sequence[RunTicks]) -> bool:
-    """Whether all parts, which are in order, are of the same run."""
+    """Return whether all parts' instants, sorted in each, are of one and the same run."""
     for part in parts:
         if part.run.base is not _ZERO:
             break
@@ -182,12 +183,13 @@ def _is_same_run(parts: Sequence[RunTicks]) -> bool:
 
 
 def _sortable_keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
-    """Return numbers that lie as the instants do, and how many bits of them are the ticks'.
+    """Return for each part one integer per instant that sorts like (run, tick), and how many low
+    bits of it are the tick (-1 where it has no such bits).
 
     Instants may be in no order. Where runs and ticks do not go into one number, ranks of the ticks
     do, and there are -1 bits.
     """
-    if all(is_single_run(part.run) for part in parts):
+    if all(is_shared_single_run(part.run) for part in parts):
         return [part.tick for part in parts], -1
     extents = [_largest_tick_and_run(part) for part in parts]
     bits = max(_LEAST_BITS, max(most.bit_length() for most, _ in extents) + 1)
@@ -200,7 +202,7 @@ def _sortable_keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
 
 
 def _largest_tick_and_run(part: RunTicks) -> tuple[int, int]:
-    """Return the largest tick, either way, and the largest run."""
+    """Return the largest absolute tick and the largest run number."""
     if part._extent is None:
         tick, run = part.tick, part.run
         most = max(int(tick.max()), -int(tick.min())) if len(tick) else 0
@@ -209,7 +211,7 @@ def _largest_tick_and_run(part: RunTicks) -> tuple[int, int]:
 
 
 def _sortable_key(part: RunTicks, bits: int) -> IntArray:
-    """Return run · 2**bits + tick, which ticks below 0 leave in order."""
+    """Return run · 2**bits + tick of each instant: it sorts like (run, tick), even if tick < 0."""
     if part._keys is None or part._keys[0] != bits:
         key = part.run << bits
         key += part.tick
@@ -222,7 +224,7 @@ _unions: deque[tuple[set[RunTicks], RunTicks]] = deque(maxlen=2)
 
 
 def union_of_instants(parts: Sequence[RunTicks]) -> RunTicks:
-    """Return every instant once, in order; each part is in order."""
+    """Return all distinct instants of the sorted parts, in order of run and tick."""
     for put_together, known in _unions:
         if put_together == set(parts):  # the same objects
             return known
@@ -248,29 +250,29 @@ def union_of_instants(parts: Sequence[RunTicks]) -> RunTicks:
     return instants
 
 
-def _known_positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
-    """Return where a part's instants are, if it is known to be one."""
+def _remembered_positions(instants: RunTicks, part: RunTicks) -> IntArray | None:
+    """Return the indices of `part` in `instants` if they were remembered, else None."""
     for one, positions in instants._parts:
         if one is part:
             return positions
     return None
 
 
-def last_position_in_run(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the last instant of its run at or before each asked (ticks in any order); -1: none."""
-    return _last_position_in_run(instants, asked)[0]
+def last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> IntArray:
+    """Return the index in `instants` of the last at or before each of `asked` in its run, or -1."""
+    return _last_position_at_or_before(instants, asked)[0]
 
 
-def _last_position_in_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
-    """Return what `last_position_in_run` does, and whether each is known to be one of the
-    instants.
+def _last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
+    """Return the index of the latest instant of the same run at or before each asked one (or -1),
+    and whether all asked ones are known to be in `instants`.
     """
     there, count = len(instants.tick), len(asked.tick)
     if there == 0:
         return np.full(count, -1, dtype=np.int64), False
     if instants.tick is asked.tick and instants.run is asked.run:
         return np.arange(count), True
-    if (known := _known_positions(instants, asked)) is not None:
+    if (known := _remembered_positions(instants, asked)) is not None:
         return known, True
     one_run = _is_same_run((instants, asked))
     known_keys, keys = (
@@ -288,9 +290,11 @@ def _last_position_in_run(instants: RunTicks, asked: RunTicks) -> tuple[IntArray
     return positions, False
 
 
-def positions_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, BoolArray | None]:
-    """Return the position of each asked instant, and whether it is there; None for all."""
-    positions, met = _last_position_in_run(instants, asked)
+def positions_with_found_mask(
+    instants: RunTicks, asked: RunTicks
+) -> tuple[IntArray, BoolArray | None]:
+    """Return each asked instant's index in `instants`, and a mask of those there (None: all)."""
+    positions, met = _last_position_at_or_before(instants, asked)
     if met or len(instants) == 0:
         return positions, None if met else np.zeros(len(asked), dtype=bool)
     there: BoolArray = (positions >= 0) & (instants.tick[positions] == asked.tick)
@@ -298,15 +302,15 @@ def positions_among(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, Bool
 
 
 def rank_instants(*parts: RunTicks) -> tuple[list[IntArray], int]:
-    """Return the number of each instant among all there are, and how many these are."""
+    """Return, per part, its instants' ranks among all distinct ones, and the number of these."""
     keys, _ = _sortable_keys(*parts)
     every, rank = np.unique(np.concatenate(keys), return_inverse=True)
     ends = np.cumsum([len(key) for key in keys])[:-1]
     return np.split(rank.reshape(-1), ends), len(every)
 
 
-def next_position_in_run(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the position of the first instant at or after each that is asked for, of its run.
+def first_position_at_or_after(instants: RunTicks, asked: RunTicks) -> IntArray:
+    """Return the index in `instants` of the first at or after each of `asked` in its run.
 
     Where its run has none so late it is the position behind the run's last one.
     """
@@ -316,6 +320,6 @@ def next_position_in_run(instants: RunTicks, asked: RunTicks) -> IntArray:
     return keys[0].searchsorted(keys[1])
 
 
-def first_position_in_run(instants: RunTicks, run: IntArray) -> IntArray:
-    """Return the position of the first instant of some runs."""
+def first_position_in_runs(instants: RunTicks, run: IntArray) -> IntArray:
+    """Return the index in `instants` of the first instant of each given run."""
     return instants.run.searchsorted(run)

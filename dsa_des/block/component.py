@@ -18,7 +18,7 @@ from dsa_des.block.parameters import PositiveRational as PositiveRational
 from dsa_des.block.parameters import Rational as Rational
 from dsa_des.block.parameters import ScenePath as ScenePath
 from dsa_des.block.parameters import SourcedText as SourcedText
-from dsa_des.block.parameters import scene_number as scene_number
+from dsa_des.block.parameters import to_scene_number as to_scene_number
 from dsa_des.block.ports import Consumer as Consumer
 from dsa_des.block.ports import Input as Input
 from dsa_des.block.ports import Output as Output
@@ -139,7 +139,7 @@ class Component:
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
         for said, unsaid in (("lockstep", False), ("remembers", None)):
-            if said not in vars(cls) and not _is_same_package(cls, said):
+            if said not in vars(cls) and not _is_defined_in_own_package(cls, said):
                 setattr(cls, said, unsaid)
 
     def __init__(self, name: str, parameters: Any, context: Context) -> None:
@@ -156,7 +156,7 @@ class Component:
 
     @classmethod
     def class_for(cls, parameters: Any) -> "type[Component]":
-        """Return the class that fills a block with these parameters; itself by default.
+        """Return the class to build for a block with these parameters; by default this one.
 
         A subclass with the same parameters and ports, where these decide what it can do.
         """
@@ -171,19 +171,23 @@ class Component:
 
     @classmethod
     def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
-        """Return the ladders on which a block with these parameters stands."""
+        """Return the ladders of models, crude to exact, that such a block is part of."""
         return cls.ladders
 
     def request(self, port: str) -> Any:
-        """Return what this block asks of the block that feeds `port`, or None."""
+        """Return the request that this block makes to the block that feeds its input `port`, which
+        gets it as `Consumer.request`; None for no request.
+        """
         return None
 
     def offer(self, port: str) -> Any:
-        """Return what this block says of the output `port` to the blocks it feeds, or None."""
+        """Return what this block declares about its output `port` to the blocks that receive it,
+        which get it as `Producer.offer`; None for nothing.
+        """
         return None
 
     def platforms(self) -> Sequence[str]:
-        """Return the names of what it moves that may carry blocks; the first carries by default.
+        """Return the platforms this block moves, by name; the first is the default carrier.
 
         Its offers and messages are then seen from what carries the receiver
         (`Message.seen_from`; an offer has a method of that name). Asked before offers.
@@ -191,7 +195,7 @@ class Component:
         return ()
 
     def records(self) -> Sequence[type[Message]]:
-        """Return the message types whose tables this block fills, once effects are known.
+        """Return the message types that this block records; called once its effects are known.
 
         By default those of its outputs. A block that sends a subclass, or has a table that a scene
         may ask for, says so here.
@@ -202,11 +206,11 @@ class Component:
         """Prepare for the run; called once, after every block downstream was set up."""
 
     def natural_duration_s(self) -> Fraction | None:
-        """Return how long this block's data lasts, for scenes that give no ``duration_s``."""
+        """Return the data's length, s, for scenes without ``duration_s``; None sets none."""
         return None
 
     def acts_every_s(self) -> Fraction | None:
-        """Return how often the block is woken though nothing comes, s; None for never.
+        """Return the period, s, of running even without messages; None: only on messages.
 
         For a block that is triggered and must act in time all the same: `Wake.idle` says at which
         rows nothing came. Asked once, after `setup`; the same of all runs in lock step.
@@ -215,7 +219,7 @@ class Component:
 
     @property
     def width(self) -> int:
-        """Number of targets per row this block emits, for sizing windows."""
+        """Number of targets in each row sent; decides how many rows are computed at once."""
         return 1
 
     def run(self, wake: "Wake") -> Message | Mapping[str, Message] | None:
@@ -241,17 +245,18 @@ class Component:
         return {}
 
     def close(self) -> None:
-        """Let go of what runs beside the simulation: a block of it has failed, and it is over."""
+        """Release what runs outside the simulation; called if a block failed and the run ends."""
 
     def warnings(self) -> list[str]:
-        """Say, after `setup`, what of this block decides results unseen or cannot be meant.
+        """Return warnings about parameters of this block that decide results without being noticed
+        or that can hardly be meant; called after `setup`.
 
         One sentence each, which names the parameter; the engine adds the block's name.
         """
         return []
 
     def failure_counts(self) -> Mapping[str, tuple[int, int] | IntArray]:
-        """Return how often this block could not do its work: by what lacked, times, of how many.
+        """Return how often work was impossible: what was missing → (failures, cases).
 
         Asked after it has run; counts are over every row that it has seen. A block that serves all
         runs gives both of each run, (2, runs) (`dsa_des.record.failure_counts.count_cases`).
@@ -259,11 +264,11 @@ class Component:
         return {}
 
     def skipped_work_notes(self) -> list[str]:
-        """Say, after `setup`, what work this block spares itself and why results allow it."""
+        """Return sentences on work skipped without changing results; called after `setup`."""
         return []
 
     def built(self, acts_on: Hook[Built]) -> list[Built]:
-        """Return the built parts of the effects that act on a quantity, in declared order.
+        """Return what active effects have built for the quantity `acts_on`, in declared order.
 
         Raises
         ------
@@ -273,7 +278,8 @@ class Component:
         known = self.all_hooks()
         if acts_on not in known:
             raise ValueError(
-                f"{self.path()} asks for effects that act on {acts_on!r}, which is not among its "
+                f"{self.import_path()} asks for effects that act on {acts_on!r}, which is not "
+                f"among its "
                 f"hooks{did_you_mean(acts_on, known)}"
             )
         return [
@@ -283,21 +289,21 @@ class Component:
         ]
 
     def built_one(self, acts_on: Hook[Built]) -> Built | None:
-        """Return what was built of the one effect that acts on a quantity, or None."""
+        """Return what the only active effect on `acts_on` has built, or None without one."""
         if not (built := self.built(acts_on)):
             return None
         (one,) = built
         return one
 
     def apply_change(self, from_s: Fraction, other: Any) -> None:
-        """Be from an instant on what another instance is, that has the parameters of then.
+        """Switch to the parameters of this block's instance `other` from time `from_s` on.
 
         Of a block that `heeds_changes`; called before anything is offered.
         """
-        raise TypeError(f"{self.path()} heeds no change")
+        raise TypeError(f"{self.import_path()} heeds no change")
 
     def adopt_state(self, before: "Component") -> None:
-        """Go on from what this block remembers under the parameters that it had `before`.
+        """Copy the state of this block's instance `before`, with its effects', to go on from it.
 
         What it makes at its first wake is not there where it changes before that.
         """
@@ -310,13 +316,13 @@ class Component:
                     setattr(new, name, getattr(old, name))
 
     def serves_replicas(self) -> bool:
-        """Return whether this block may serve replicas in lock step."""
+        """Return whether one instance can serve all replicas of a lock-step simulation."""
         return type(self).lockstep
 
     def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], "Component"]
     ) -> "Component | None":
-        """Return what runs this block for all runs in lock step, or None: one instance each.
+        """Return one component for all lock-step runs, or None if each needs its own.
 
         Asked of a block that cannot be shared as it is, once it is set up. What it returns gets the
         rows of all runs, which may go side by side, and gives what each instance would. It must
@@ -327,17 +333,17 @@ class Component:
         return None
 
     def stream(self, purpose: str) -> Stream:
-        """Return this block's keyed random numbers for one purpose."""
+        """Return this block's stream of keyed random numbers for one purpose."""
         return self.context.streams.stream(self.name, purpose)
 
     @classmethod
-    def path(cls) -> str:
-        """Return ``module:Class``."""
+    def import_path(cls) -> str:
+        """Return the class as text ``module:Class``."""
         return f"{cls.__module__}:{cls.__qualname__}"
 
 
-def _is_same_package(cls: type[Component], said: str) -> bool:
-    """Whether the base that last said something of its code is of the same package."""
+def _is_defined_in_own_package(cls: type[Component], said: str) -> bool:
+    """Return whether attribute `said` is defined by a class of the same top-level package."""
     base = next(base for base in cls.__mro__ if said in vars(base))
     return base.__module__.partition(".")[0] == cls.__module__.partition(".")[0]
 
@@ -354,7 +360,7 @@ class RunEnd(Message):
 
 
 def may_end_its_run(block: type[Component]) -> bool:
-    """Return whether blocks of a class may end their run."""
+    """Return whether blocks of a class can end their run: one of its outputs sends `RunEnd`."""
     return any(issubclass(output.message, RunEnd) for output in block.outputs.values())
 
 

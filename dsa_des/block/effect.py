@@ -38,13 +38,15 @@ class Hook(str, Generic[Built]):
         return hook
 
     @property
-    def is_called(self) -> bool:
-        """Whether effects build something to call, not a value."""
+    def builds_callable(self) -> bool:
+        """Whether effects on this quantity build something to call rather than a value."""
         return any("__call__" in vars(base) for base in self.contract.__mro__)
 
-    def sentence(self) -> str:
-        """Return, for example, ``(cells) -> factor of each cell's SNR``."""
-        if not self.is_called:
+    def signature_text(self) -> str:
+        """Return how the effect is called and what that returns, such as ``(cells) -> factor of
+        each cell's SNR``; for a value only its meaning.
+        """
+        if not self.builds_callable:
             return self.meaning
         _, *names = inspect.signature(self.contract.__call__).parameters
         return f"({', '.join(names)}) -> {self.meaning}"
@@ -70,7 +72,7 @@ class Verdict:
 
     @classmethod
     def of_flag(cls, parameters: Any, name: str) -> "Verdict":
-        """Return the verdict of a parameter that is true where the effect is asked for."""
+        """Return a verdict: wanted if the parameter `name` is true; its value is the reason."""
         asked = bool(getattr(parameters, name))
         return cls(asked, f"{name} is {str(asked).lower()}")
 
@@ -103,13 +105,13 @@ class Effect(Generic[Built]):
             cls.neutral = False
 
     def verdict(self, block: Any) -> Verdict:
-        """Say whether the scene calls for this effect in this block (a `Component`)."""
+        """Return whether this effect matters in the block (a `Component`) of the scene, and why."""
         if self.flag:
             return Verdict.of_flag(block.p, self.flag)
         raise TypeError(f"{type(self).__name__} gives no verdict")
 
     def build(self, block: Any) -> Built:
-        """Return what the block (a `Component`) calls at run time."""
+        """Return the function or value that this effect gives the `Component` at run time."""
         if self.builds is None:
             raise TypeError(f"{type(self).__name__} builds nothing")
         built: Built = type(self).builds(block)

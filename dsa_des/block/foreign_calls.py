@@ -15,7 +15,7 @@ from dsa_des.terminal.interruption import Terminated
 
 
 def is_stop_request(error: BaseException) -> bool:
-    """Return whether an exception is no stranger's error but means that we have to stop.
+    """Return whether an exception means to stop the program, not an error in foreign code.
 
     Ctrl-C, and whatever this package raises itself to leave (in a handler of a signal, say).
     """
@@ -41,7 +41,7 @@ REFUSALS = (ValueError, OSError, ArithmeticError, MemoryError)
 
 
 def describe_error(error: BaseException) -> str:
-    """Return what an exception says, with its kind where its text alone says little."""
+    """Return the text of an exception; for arithmetic and memory errors with an explanation."""
     if isinstance(error, ArithmeticError):
         return f"its numbers are too large or too small to be computed with ({error})"
     if isinstance(error, MemoryError):
@@ -54,7 +54,7 @@ _A_FOREIGN_PART = 3
 
 
 def error_with_line(error: BaseException, cls: type) -> str:
-    """Return what an exception says, and the line of a class's own package where it came from.
+    """Return an exception's type, text and innermost line in the class's own package.
 
     One that ends a command with 3 says all itself: a program or an FMU has failed, not the class.
     """
@@ -72,7 +72,7 @@ def error_with_line(error: BaseException, cls: type) -> str:
 
 
 def error_with_kind(error: BaseException) -> str:
-    """Return what an exception says, with its kind: ``SystemExit: 0``."""
+    """Return an exception's type and text, such as ``SystemExit: 0``."""
     try:
         text = str(error)
     except Exception:
@@ -106,7 +106,7 @@ def wrap_foreign_errors(*expected: type[Exception]) -> Iterator[None]:
 
 @contextmanager
 def _watch_interrupts() -> Iterator[Any]:
-    """Give a function that says whether ctrl-C was pressed meanwhile.
+    """Yield a function that returns whether ctrl-C was pressed since the context began.
 
     A stranger may raise KeyboardInterrupt; only the signal tells it from the user's.
     """

@@ -41,7 +41,7 @@ class Verified(NamedTuple):
 
 
 def absolute_difference(value: AnyArray, reference: AnyArray) -> FloatArray:
-    """Return how far values are apart, element by element."""
+    """Return the absolute difference of two arrays, element by element."""
     apart: FloatArray = np.abs(value - reference)
     return apart
 
@@ -102,8 +102,8 @@ class Rung:
     shared: Mapping[str, Any] = field(default_factory=dict)
     sections: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
-    def changes(self, block: Mapping[str, Any]) -> dict[str, Any]:
-        """Return the parameters to set in a scene's block.
+    def parameters_to_set(self, block: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the parameters, by key, that turn a scene's block into this rung.
 
         Unavailable if the block does not say what the rung needs.
         """

@@ -41,7 +41,7 @@ _FURTHER = ("d", "<", ">", "8", "*")
 
 
 def marks_of(classes: Mapping[str, type | None]) -> dict[str, Mark]:
-    """Return name → mark, of blocks in order of their names; None for a name that is no block."""
+    """Return name → plot mark (colour and marker): that of the block's class, or neutral."""
     own = {name: getattr(cls, "mark", None) for name, cls in classes.items()}
     return distinguish_marks(
         {n: mark if isinstance(mark, Mark) else None for n, mark in own.items()}
@@ -49,7 +49,7 @@ def marks_of(classes: Mapping[str, type | None]) -> dict[str, Mark]:
 
 
 def distinguish_marks(kinds: Mapping[str, Mark | None]) -> dict[str, Mark]:
-    """Return name → mark, in order of the names: of one kind the same colour, other markers."""
+    """Return name → plot mark: equal marks keep colour but differ in marker; None gets neutral."""
     found: dict[str, Mark] = {}
     before: dict[Mark, int] = {}
     unknown = 0

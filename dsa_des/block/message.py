@@ -11,9 +11,14 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Text, join_values, null_column, pick_rows
-from dsa_des.arrays.entries import entries_of, offsets_of, row_of_entries
-from dsa_des.arrays.run_ticks import RunTicks, concatenate_runs, is_single_run, runs_of_single
+from dsa_des.arrays.column_values import Columns, Text, join_values, null_float_column, pick_rows
+from dsa_des.arrays.entries import offsets_from_entry_rows, rows_of_entries, select_entries
+from dsa_des.arrays.run_ticks import (
+    RunTicks,
+    concatenate_runs,
+    is_shared_single_run,
+    single_run_numbers,
+)
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.recorded_columns import (
     PER_ENTRY,
@@ -23,8 +28,8 @@ from dsa_des.block.recorded_columns import (
     DerivedColumns,
     column,
     columns,
-    columns_of,
-    instants_of,
+    columns_of_dataclass,
+    instant_columns,
     per_entry,
     per_row,
     static,
@@ -40,13 +45,13 @@ __all__ = [
     "Text",
     "column",
     "columns",
-    "columns_of",
+    "columns_of_dataclass",
     "derive_columns",
-    "instants_of",
-    "offsets_of",
+    "instant_columns",
+    "offsets_from_entry_rows",
     "per_entry",
     "per_row",
-    "rows_of",
+    "slice_columns",
     "static",
 ]
 
@@ -59,7 +64,7 @@ _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] =
 _DERIVED: dict[type, DerivedColumns] = {}
 
 
-def _fields_by_layout(
+def _row_entry_static_fields(
     message_type: type,
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     if message_type not in _LAYOUTS:
@@ -72,8 +77,8 @@ def _fields_by_layout(
     return _LAYOUTS[message_type]
 
 
-def rows_of(columns: Columns, rows: slice) -> Columns:
-    """Return some rows of recorded columns."""
+def slice_columns(columns: Columns, rows: slice) -> Columns:
+    """Return the given slice of rows of each recorded column."""
     return {
         name: Text(values.codes[rows], values.names) if isinstance(values, Text) else values[rows]
         for name, values in columns.items()
@@ -81,7 +86,7 @@ def rows_of(columns: Columns, rows: slice) -> Columns:
 
 
 def derive_columns(message_type: type) -> DerivedColumns:
-    """Return what a message class records by its fields."""
+    """Return the recorded columns declared by a message class's fields; found once per class."""
     if message_type not in _DERIVED:
         _DERIVED[message_type] = DerivedColumns(message_type, Message)
     return _DERIVED[message_type]
@@ -96,7 +101,7 @@ class _DerivedRecorded:
 
 
 class _Found:
-    """What was found in a message's arrays; it is not among its `vars`, which fields are."""
+    """What was computed from a message's arrays and is kept; not among its fields (`vars`)."""
 
     __slots__ = ("_found_instants", "_found_rows")
 
@@ -146,7 +151,7 @@ class Message(_Found):
         for name, kind in derive_columns(type(self)).optional.items():
             if getattr(self, name) is None:
                 count = int(self.offsets[-1])  # type: ignore[attr-defined]
-                none = null_column(count) if kind == "float64" else np.zeros(count, np.int64)
+                none = null_float_column(count) if kind == "float64" else np.zeros(count, np.int64)
                 setattr(self, name, none)
 
     def __len__(self) -> int:
@@ -154,13 +159,13 @@ class Message(_Found):
 
     @property
     def size(self) -> int:
-        """How many rows and entries there are."""
+        """The number of rows plus the number of entries."""
         offsets = getattr(self, "offsets", None)
         return len(self.tick) + (0 if offsets is None else int(offsets[-1]))
 
     def _runs(self) -> IntArray:
-        """Return of which run each row is, also where a class has a `__post_init__` of its own."""
-        return runs_of_single(len(self.tick)) if self.run is None else self.run
+        """Return the run number of each row; zeros where the message has none."""
+        return single_run_numbers(len(self.tick)) if self.run is None else self.run
 
     @property
     def instants(self) -> RunTicks:
@@ -176,11 +181,11 @@ class Message(_Found):
 
     @property
     def row_of_entries(self) -> IntArray:
-        """Row of each entry, where a class has `offsets`."""
+        """The row number of each entry, in a class with `offsets`."""
         offsets = self.offsets  # type: ignore[attr-defined]
         known = getattr(self, "_found_rows", None)
         if known is None or known[0] is not offsets:
-            known = self._found_rows = offsets, row_of_entries(offsets)
+            known = self._found_rows = offsets, rows_of_entries(offsets)
         return known[1]
 
     @row_of_entries.setter
@@ -198,10 +203,12 @@ class Message(_Found):
     def empty(cls, **others: Any) -> Self:
         """Return a message of one row, at tick 0, without entries, with `others` as fields."""
         start, none = np.zeros(1, dtype=np.int64), np.zeros(2, dtype=np.int64)
-        return cls(tick=start, **{"offsets": none, **derive_columns(cls).empty(), **others})
+        return cls(
+            tick=start, **{"offsets": none, **derive_columns(cls).empty_entry_fields(), **others}
+        )
 
     def check(self) -> None:
-        """Refuse fields whose first axis is not that of the rows, or of the entries.
+        """Raise TypeError or ValueError if a field's length is not that of rows or entries.
 
         Once per message that is sent: whoever reads it would else take one row's values for
         another's, or leave some out, without a word.
@@ -211,7 +218,7 @@ class Message(_Found):
         TypeError, ValueError
             With the class, the field, its length and that which it must have.
         """
-        rows, (row_names, entry_names, _) = len(self.tick), _fields_by_layout(type(self))
+        rows, (row_names, entry_names, _) = len(self.tick), _row_entry_static_fields(type(self))
         self.run = self._runs()
         if len(self.run) != rows:
             raise ValueError(f"{_describe_field(self, 'run')} has {len(self.run)} of {rows} rows")
@@ -241,15 +248,17 @@ class Message(_Found):
                 return self.take(np.arange(start, stop, step))
             if start == 0 and stop == len(self):
                 return self
-        row_names, entry_names, _ = _fields_by_layout(type(self))
+        row_names, entry_names, _ = _row_entry_static_fields(type(self))
         result = self._copy()
         values = result.__dict__
         for name in row_names:
             values[name] = pick_rows(values[name], rows)
         run = self._runs()
-        result.run = runs_of_single(len(result.tick)) if is_single_run(run) else run[rows]
+        result.run = (
+            single_run_numbers(len(result.tick)) if is_shared_single_run(run) else run[rows]
+        )
         if entry_names or "offsets" in values:
-            values["offsets"], index = entries_of(values["offsets"], rows)
+            values["offsets"], index = select_entries(values["offsets"], rows)
             for name in entry_names:
                 values[name] = pick_rows(values[name], index)
         return result
@@ -257,22 +266,22 @@ class Message(_Found):
     def reorder(self, order: IntArray) -> Self:
         """Return the message with its entries in another order, each still of its row."""
         result = self._copy()
-        for name in _fields_by_layout(type(self))[1]:
+        for name in _row_entry_static_fields(type(self))[1]:
             setattr(result, name, pick_rows(getattr(self, name), order))
         return result
 
     def seen_from(self, platform: str) -> Self:
-        """Return the message as a block sees it that a platform carries (`Component.platforms`)."""
+        """Return the message as seen by a block on the given platform; by default unchanged."""
         return self
 
-    def of_runs(self, run: IntArray) -> Self:
-        """Return the message as one of other runs."""
+    def with_runs(self, run: IntArray) -> Self:
+        """Return a copy of the message whose rows have the given run numbers."""
         result = self._copy()
         result.run = run
         return result
 
-    def is_alike(self, other: "Message") -> bool:
-        """Return whether another message differs in nothing but its rows and their values."""
+    def has_same_layout(self, other: "Message") -> bool:
+        """Return whether another message has equal class, types, keys and static values."""
         if self.__class__ is not other.__class__:
             return False
         mine, others = self.__dict__, other.__dict__
@@ -283,7 +292,9 @@ class Message(_Found):
             names = [name for name, kind in zip(mine, kinds, strict=True) if kind is dict]
             if any(mine[name].keys() != others[name].keys() for name in names):
                 return False
-        return all(mine.get(name) is others.get(name) for name in _fields_by_layout(type(self))[2])
+        return all(
+            mine.get(name) is others.get(name) for name in _row_entry_static_fields(type(self))[2]
+        )
 
     def tables(self) -> dict[str, Columns]:
         """Return the rows to record: table → column → values, as declared in `recorded`.
@@ -293,15 +304,18 @@ class Message(_Found):
         return derive_columns(type(self)).tables(self)
 
     def repeat_rows(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
-        """Return its rows with the entries of rows of another message, as if they were new.
+        """Return this message with entries of the rows of `of`, as if they were measured again.
 
         Row i has those of row ``source[i]`` of the other, ``later_s[i]`` older; none where that is
         below 0. What rows say besides stays.
         """
-        offsets, index = entries_of(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
+        offsets, index = select_entries(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
         there = np.repeat(source >= 0, np.diff(offsets))
         result = of.reorder(np.asarray(index)[there])
-        for name in (*_fields_by_layout(type(self))[0], *_fields_by_layout(type(self))[2]):
+        for name in (
+            *_row_entry_static_fields(type(self))[0],
+            *_row_entry_static_fields(type(self))[2],
+        ):
             setattr(result, name, getattr(self, name))
         result.run = self._runs()
         kept = np.where(source >= 0, np.diff(offsets), 0)
@@ -309,7 +323,7 @@ class Message(_Found):
         return result
 
     def with_stuck_bit(self, rows: BoolArray, quantity: str, worth: float) -> Self:
-        """Return the message with one bit of a quantity set in all entries of some rows.
+        """Return the message with a bit of `quantity` set at mask `rows`; by default unchanged.
 
         `quantity` is one of `may_stick`, and `worth` what the bit is worth in its unit.
         """
@@ -320,7 +334,7 @@ class Message(_Found):
         """Return one message with the rows of all parts, in the order given."""
         if len(parts) == 1:
             return parts[0]
-        row_names, entry_names, _ = _fields_by_layout(type(parts[0]))
+        row_names, entry_names, _ = _row_entry_static_fields(type(parts[0]))
         # Static fields come from the last part: what a wire held before its first message may
         # know less than a real one.
         result = parts[-1]._copy()
@@ -340,7 +354,7 @@ class Message(_Found):
 
     @classmethod
     def make_initial(cls, values: Mapping[str, Any]) -> Self:
-        """Return the message that a delayed wire holds before the first real one.
+        """Return what a delayed wire holds before its first message, from the scene's values.
 
         Parameters
         ----------
@@ -366,24 +380,24 @@ def _array_kind(value: Any) -> str:
 
 
 def _check_lengths(message: Message, names: tuple[str, ...], count: int, what: str) -> None:
-    """Refuse arrays, or those of dicts, that have not one value for each row or entry."""
+    """Raise unless each named array, also in dicts, has `count` values along its first axis."""
     fields_of = message.__dict__
     for name in names:
         value = fields_of.get(name)
         if value.__class__ is np.ndarray:
             if not value.ndim or len(value) != count or value.dtype.kind not in _NUMBERS:
-                _refuse_length(message, name, value, count, what)
+                _check_unusual_array(message, name, value, count, what)
         elif value.__class__ is dict:
             for key, item in value.items():
                 fits = item.__class__ is np.ndarray and item.ndim and len(item) == count
                 if not (fits or item is None or hasattr(item, "take_rows")):
-                    _refuse_length(message, f"{name}[{key!r}]", item, count, what)
+                    _check_unusual_array(message, f"{name}[{key!r}]", item, count, what)
         elif value is not None and not hasattr(value, "take_rows"):
-            _refuse_length(message, name, value, count, what)
+            _check_unusual_array(message, name, value, count, what)
 
 
-def _refuse_length(message: Message, name: str, value: Any, count: int, what: str) -> None:
-    """Raise unless it is an array of another class that will do, such as a masked one."""
+def _check_unusual_array(message: Message, name: str, value: Any, count: int, what: str) -> None:
+    """Raise TypeError or ValueError unless the value is an array of `count` numbers."""
     said = f"{_describe_field(message, name)} is {_array_kind(value)}"
     if not isinstance(value, np.ndarray):
         raise TypeError(f"{said}: an array of {count} {what} is needed")

@@ -20,7 +20,7 @@ from pydantic import (
     field_validator,
 )
 
-from dsa_des.block.shipped_files import resolve_shipped
+from dsa_des.block.shipped_files import existing_or_shipped_path
 from dsa_des.files.input_files import resolve_home
 from dsa_des.time.clock import MOST_JITTER, ClockSpec, parse_rational
 
@@ -48,23 +48,24 @@ LARGEST_BY_UNIT: Mapping[str, float] = {
 _UNITS = sorted(LARGEST_BY_UNIT, key=len, reverse=True)
 
 
-def largest_allowed(name: str) -> float:
-    """Return the largest size allowed of a quantity, by the unit at the end of its name."""
+def largest_allowed_value(name: str) -> float:
+    """Return a quantity's largest allowed absolute value, by the unit that ends its name."""
     unit = next((unit for unit in _UNITS if name.endswith(f"_{unit}")), None)
     return LARGEST if unit is None else LARGEST_BY_UNIT[unit]
 
 
 def refuse_extremes(name: str, value: Any) -> None:
-    """Raise ValueError when a number, or one in a list or table, is too large or too small.
+    """Raise ValueError if a number, also in lists and tables, is too large or close to 0.
 
     The name of the quantity has its unit at the end; what is no number, list or table of numbers
     passes.
     """
     if isinstance(value, float | int):
         size = abs(value)
-        if 0.0 < size < SMALLEST or size > largest_allowed(name):
+        if 0.0 < size < SMALLEST or size > largest_allowed_value(name):
             raise ValueError(
-                f"must be 0, or from {SMALLEST:g} to {largest_allowed(name):g} in size: that is "
+                f"must be 0, or from {SMALLEST:g} to {largest_allowed_value(name):g} in size: "
+                f"that is "
                 f"what "
                 "can be computed with"
             )
@@ -76,24 +77,24 @@ def refuse_extremes(name: str, value: Any) -> None:
             refuse_extremes(name, item)
 
 
-def scene_number(value: Fraction) -> int | float | str:
-    """Return an exact number the way a scene would hold it."""
+def to_scene_number(value: Fraction) -> int | float | str:
+    """Return an exact number as in a scene: int, float if exact, else text such as ``1/3``."""
     if value.denominator == 1:
         return int(value)
     return float(value) if Fraction(repr(float(value))) == value else str(value)
 
 
 def _describe_value(value: Any) -> str:
-    """Return a parameter's value as a sentence holds it."""
+    """Return a parameter's value as text for use in a sentence."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
         return f"{value:g}"
-    return str(scene_number(value)) if isinstance(value, Fraction) else repr(value)
+    return str(to_scene_number(value)) if isinstance(value, Fraction) else repr(value)
 
 
 #: An exact rate or time: a number or text such as "30000/1001".
-Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(scene_number)]
+Rational = Annotated[Fraction, BeforeValidator(parse_rational), PlainSerializer(to_scene_number)]
 PositiveRational = Annotated[Rational, Field(gt=0)]
 NonNegativeRational = Annotated[Rational, Field(ge=0)]
 
@@ -117,7 +118,7 @@ def _resolve_path(value: object) -> Path:
         raise ValueError("must be a path, as text")
     path = resolve_home(str(value))
     if isinstance(value, SourcedText) and not path.is_absolute():
-        path = resolve_shipped(value.folder / path, str(value))
+        path = existing_or_shipped_path(value.folder / path, str(value))
     return path
 
 
@@ -149,16 +150,16 @@ class Parameters(BaseModel):
     @field_validator("*", mode="after")
     @classmethod
     def _computable(cls, value: Any, info: ValidationInfo) -> Any:
-        """Refuse numbers that no physics can compute with (`dsa_des.block.parameters`)."""
+        """Raise ValueError for numbers too large or small to compute with; else return them."""
         refuse_extremes(info.field_name or "", value)
         return value
 
     def ineffective_key_notes(self) -> list[str]:
-        """Say which keys were given a value that changes nothing, and because of what."""
+        """Return a sentence per key set without effect, with the reason; by default none."""
         return []
 
     def note_ineffective(self, *keys: str, because: str) -> list[str]:
-        """Say which keys without effect, `because` of another one, are not at their defaults."""
+        """Return a sentence, with reason `because`, per key not at its default but ineffective."""
         fields = type(self).model_fields
         return [
             f"{key} is {_describe_value(getattr(self, key))}: it has no effect, {because}"
@@ -168,7 +169,7 @@ class Parameters(BaseModel):
 
 
 def nested_models(annotation: Any) -> list[type[BaseModel]]:
-    """Return the models of tables that a field holds, in the order in which it names them."""
+    """Return the pydantic models in a field's type annotation, in the order found there."""
     if isinstance(annotation, type) and issubclass(annotation, BaseModel):
         return [annotation]
     models: list[type[BaseModel]] = []

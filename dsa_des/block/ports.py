@@ -41,7 +41,7 @@ class Input:
 
     @property
     def is_held(self) -> bool:
-        """Whether the block sees the last message, rather than all that came since its last run."""
+        """Whether the block reads only the latest message, not all since its last run."""
         return self.mode != "queued" and not self.many
 
 
@@ -62,7 +62,7 @@ class Output:
 
 @dataclass(frozen=True)
 class Consumer:
-    """A block fed by one of our outputs, and what it asks of us.
+    """A block that receives one of our outputs, with the request that it makes to us.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ class Consumer:
 
 @dataclass(frozen=True)
 class Producer:
-    """A block that feeds one of our inputs, and what it says of itself.
+    """A block that feeds one of our inputs, with what it declares about its output.
 
     Parameters
     ----------

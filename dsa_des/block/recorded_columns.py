@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dsa_des.arrays.column_values import Columns, Instants, Text, take_rows
-from dsa_des.arrays.run_ticks import is_single_run
+from dsa_des.arrays.run_ticks import is_shared_single_run
 from dsa_des.arrays.types import IntArray
 
 # How a field of a message depends on its rows.
@@ -58,7 +58,7 @@ ON_PLATFORM = {PLATFORM: Column("", "", "what carries that block", "text")}
 
 @dataclass(frozen=True)
 class Filled:
-    """How a field is recorded: as one column, or, a dict, as those of its columns it holds."""
+    """How a message field is recorded: as one column, or one per key of a dict of arrays."""
 
     columns: Mapping[str, Column]
     many: bool = False
@@ -69,12 +69,12 @@ class Filled:
 
 
 def per_row(**kwargs: Any) -> Any:
-    """Declare a field whose first axis is the rows, and which is not recorded."""
+    """Declare a dataclass field that has one value per row and is not recorded."""
     return field(metadata={"per": PER_ROW}, **kwargs)
 
 
 def per_entry(**kwargs: Any) -> Any:
-    """Declare a field with a varying number of entries per row, which is not recorded.
+    """Declare a dataclass field with one value per entry (some per row) that is not recorded.
 
     The class must have `offsets`.
     """
@@ -139,7 +139,7 @@ def columns(
     for_entries: bool = False,
     **kwargs: Any,
 ) -> Any:
-    """Declare a field that is a dict of arrays; what it does not hold of the columns is null.
+    """Declare a dict field recorded as one column per key; a missing key is recorded as null.
 
     Parameters
     ----------
@@ -154,8 +154,8 @@ def columns(
     return field(metadata={"per": of, _RECORDED: how}, **kwargs)
 
 
-def columns_of(group: type) -> dict[str, Column]:
-    """Return what the fields of a group of columns, a dataclass, are recorded as."""
+def columns_of_dataclass(group: type) -> dict[str, Column]:
+    """Return the recorded columns, by name, that the fields of a dataclass declare."""
     found: dict[str, Column] = {}
     for item in fields(group):
         how: Filled = item.metadata[_RECORDED]
@@ -173,10 +173,12 @@ def _check_kind(kind: str) -> str:
 _RECORDED = "recorded"
 
 
-def instants_of(message: Any, row: IntArray | None = None) -> Columns:
-    """Return the columns that say when each row of a message is, or of which row each entry is."""
+def instant_columns(message: Any, row: IntArray | None = None) -> Columns:
+    """Return the columns ``tick`` and, if there are several runs, ``replica``: for each row of a
+    message, or for each entry if `row` gives its row.
+    """
     columns: Columns = {"tick": message.tick}
-    if not is_single_run(message.run):
+    if not is_shared_single_run(message.run):
         columns["replica"] = message.run
     if row is None:
         return columns
@@ -184,7 +186,7 @@ def instants_of(message: Any, row: IntArray | None = None) -> Columns:
 
 
 class DerivedColumns:
-    """What one message class records by its fields; those of its mix-ins come last.
+    """The recorded columns declared by a message class's fields; those of mix-ins come last.
 
     TypeError if a field fills a column of a table that the class does not name, or two fill one
     column.
@@ -206,7 +208,7 @@ class DerivedColumns:
         names = [name for name in _fields_in_order(message_type, base) if name in self._fields]
         if not issubclass(message_type.__mro__[1], base):
             # What only some fill comes behind what the mix-ins have.
-            names.sort(key=lambda name: _is_many(self._fields[name]))
+            names.sort(key=lambda name: _is_entry_dict_field(self._fields[name]))
         for name in names:
             item = self._fields[name]
             how: Filled | None = item.metadata.get(_RECORDED)
@@ -237,8 +239,8 @@ class DerivedColumns:
             known[name] = one
         filled.append((field_name, how))
 
-    def empty(self) -> dict[str, Any]:
-        """Return fields of entries by name, without any entry."""
+    def empty_entry_fields(self) -> dict[str, Any]:
+        """Return all recorded entry fields by name, as arrays (or dicts) of length 0."""
         made: dict[str, Any] = {}
         for name, item in self._fields.items():
             how: Filled | None = item.metadata.get(_RECORDED)
@@ -251,16 +253,18 @@ class DerivedColumns:
         return made
 
     def tables(self, message: Any) -> dict[str, Columns]:
-        """Return the rows to record of a message.
+        """Return the rows that a message records: table → column → values.
 
         ValueError if a dict of columns holds one that belongs to another field.
         """
         tables: dict[str, Columns] = {}
         if self._rows:
-            tables[self._row_table] = self._fill_columns(message, self._rows, instants_of(message))
+            tables[self._row_table] = self._fill_columns(
+                message, self._rows, instant_columns(message)
+            )
         if self._entries:
             row = message.row_of_entries
-            made = instants_of(message, row)
+            made = instant_columns(message, row)
             tables[self._entry_table] = self._fill_columns(message, self._entries, made, row)
         return tables
 
@@ -282,7 +286,7 @@ class DerivedColumns:
             if how.instant:
                 values = Instants(values, getattr(message, "ticks_per_s", _NANOSECONDS))
             if how.in_entries and row is not None:
-                values = _entries_of_rows(values, row)
+                values = _values_at_entries(values, row)
             made[_names(name, how)[0]] = values
         for name, how in dicts:
             held = getattr(message, name) if how.value is None else how.value(message)
@@ -302,13 +306,13 @@ def _names(field_name: str, how: Filled) -> list[str]:
     return [name or field_name for name in how.columns]
 
 
-def _is_many(item: Any) -> bool:
+def _is_entry_dict_field(item: Any) -> bool:
     how: Filled | None = item.metadata.get(_RECORDED)
     return how is not None and how.many and item.metadata["per"] == PER_ENTRY
 
 
 def _fields_in_order(message_type: type, base: type) -> Iterator[str]:
-    """Yield the names of a class: those of messages, the oldest first, then its mix-ins'."""
+    """Yield a message class's field names: message bases, oldest first, then mix-ins."""
     kinds = [kind for kind in message_type.__mro__ if hasattr(kind, "__dataclass_fields__")]
     messages = [kind for kind in reversed(kinds) if issubclass(kind, base)]
     mixed = [kind for kind in kinds if not issubclass(kind, base)]
@@ -316,7 +320,7 @@ def _fields_in_order(message_type: type, base: type) -> Iterator[str]:
     yield from dict.fromkeys(name for names in of_kinds for name in names)
 
 
-def _entries_of_rows(values: Any, row: IntArray) -> Any:
+def _values_at_entries(values: Any, row: IntArray) -> Any:
     if isinstance(values, Text):
         return Text(values.codes.take(row), values.names)
     return take_rows(values, row)

@@ -9,16 +9,16 @@ from typing import Any
 
 from dsa_des.block.component import Component, Input, Output, Parameters, SourcedText
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import (
+from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
+from dsa_des.block.message import Message
+from dsa_des.block.shadowed_packages import (
     NotAllowed,
     NotImportable,
     is_ours,
-    load_installed,
+    load_entry_point,
     load_named,
-    load_point,
+    load_unnamed_entry_point,
 )
-from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
-from dsa_des.block.message import Message
 from dsa_des.errors import did_you_mean
 
 SECTIONS = "dsa_des.sections"
@@ -27,7 +27,9 @@ SECTIONS = "dsa_des.sections"
 @lru_cache(maxsize=1)
 def section_models() -> dict[str, type[Parameters]]:
     """Return the registered section models by table name, sorted."""
-    return {name: load_installed(point) for name, point in entry_points_of(SECTIONS).items()}
+    return {
+        name: load_unnamed_entry_point(point) for name, point in entry_points_of(SECTIONS).items()
+    }
 
 
 class ClassText(str):
@@ -40,8 +42,8 @@ class ClassText(str):
     cls: type
 
 
-def type_text(cls: type, group: str) -> str:
-    """Return how a scene names a class: as registered in a group of entry points.
+def class_name_in_scene(cls: type, group: str) -> str:
+    """Return a class's name in a scene: that of its entry point if it is registered.
 
     Else as ``module:Class`` where any process can import it, and else as a `ClassText`.
     """
@@ -56,24 +58,24 @@ def type_text(cls: type, group: str) -> str:
     return text
 
 
-def classes_in(value: Any) -> list[str]:
-    """Return every `ClassText` in tables and lists."""
+def class_texts_in(value: Any) -> list[str]:
+    """Return every `ClassText` in a value, also inside tables and lists."""
     if isinstance(value, ClassText):
         return [value]
     if isinstance(value, dict):
-        return [text for item in value.values() for text in classes_in(item)]
+        return [text for item in value.values() for text in class_texts_in(item)]
     if isinstance(value, list | tuple):
-        return [text for item in value for text in classes_in(item)]
+        return [text for item in value for text in class_texts_in(item)]
     return []
 
 
-def add_source(value: str, folder: Any) -> str:
-    """Return a text as written in a file of a folder; a class stays one."""
+def with_source_folder(value: str, folder: Any) -> str:
+    """Return the text with the folder it was written in (`SourcedText`); `ClassText` unchanged."""
     return value if isinstance(value, ClassText) else SourcedText.from_text(value, folder)
 
 
 def _is_importable(cls: type) -> bool:
-    """Return whether another process finds this very class by its module and name."""
+    """Return whether another process would get this very class by importing its module and name."""
     module = sys.modules.get(cls.__module__)
     if module is None or cls.__module__ == "__main__":
         return False
@@ -100,7 +102,7 @@ class UnknownType(Exception):
 class NotImported(UnknownType):
     """A block type is foreign, and nothing foreign may be imported.
 
-    See `dsa_des.block.foreign.Imports`.
+    See `dsa_des.block.shadowed_packages.Imports`.
     """
 
 
@@ -120,7 +122,9 @@ def find_component(type_name: str, key: str = "", beside: Sequence[Path] = ()) -
         hint = did_you_mean(type_name, entry_points_of())
         raise UnknownType(f"unknown block type{hint} (or module:Class)")
     try:
-        found = load_named(type_name, key, beside) if point is None else load_point(point, key)
+        found = (
+            load_named(type_name, key, beside) if point is None else load_entry_point(point, key)
+        )
     except NotAllowed as error:
         raise NotImported(str(error)) from None
     except NotImportable as error:
@@ -131,7 +135,7 @@ def find_component(type_name: str, key: str = "", beside: Sequence[Path] = ()) -
 
 
 def _check_component_class(type_name: str, found: Any) -> type[Component]:
-    """Return a stranger's class if it is a component."""
+    """Return the component class of a type name; UnknownType if invalid or its own code fails."""
     try:
         with wrap_foreign_errors(UnknownType):
             return _require_component(found)
@@ -140,7 +144,7 @@ def _check_component_class(type_name: str, found: Any) -> type[Component]:
 
 
 def _require_component(found: Any) -> type[Component]:
-    """Return a class if it declares what the engine reads of every block."""
+    """Return a `Component` class with valid ports and parameters; else raise UnknownType."""
     if not (isinstance(found, type) and issubclass(found, Component)):
         raise UnknownType("is not a dsa_des.Component")
     for name, kind in (("inputs", Input), ("outputs", Output)):
@@ -151,12 +155,12 @@ def _require_component(found: Any) -> type[Component]:
         )
         if not fine:
             raise UnknownType(
-                f"{found.path()} declares {name} wrongly: they must be a table of names and "
+                f"{found.import_path()} declares {name} wrongly: they must be a table of names and "
                 f"dsa_des.{kind.__name__} of a dsa_des.Message"
             )
     if not (isinstance(found.Parameters, type) and issubclass(found.Parameters, Parameters)):
         raise UnknownType(
-            f"{found.path()} declares Parameters wrongly: they must be a subclass of "
+            f"{found.import_path()} declares Parameters wrongly: they must be a subclass of "
             "dsa_des.Parameters"
         )
     return found

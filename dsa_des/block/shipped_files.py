@@ -10,8 +10,8 @@ from collections.abc import Iterator
 from pathlib import Path, PurePosixPath
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_installed
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import UsageError
 
 #: The entry points of functions that return a folder of scenes and studies.
@@ -27,15 +27,15 @@ def example_folders() -> list[Path]:
     for point in entry_points_of(GROUP).values():
         try:
             with wrap_foreign_errors(UsageError):
-                found.append(Path(load_installed(point)()))
+                found.append(Path(load_unnamed_entry_point(point)()))
         except ForeignFailure as error:
             message = f"{GROUP}: {point.name} gives no folder: {error}"
             raise UsageError(message) from error.__cause__
     return [folder for folder in found if folder.is_dir()]
 
 
-def resolve_shipped(path: Path, name: str) -> Path:
-    """Return a path that exists, or else the shipped file that a name means, or else the path.
+def existing_or_shipped_path(path: Path, name: str) -> Path:
+    """Return the path if it exists, else the only shipped file `name` matches, else the path.
 
     The name is as it was written: ``alerting/do365b.conf``, or ``do365b.conf`` where only one is
     called so.
@@ -50,14 +50,14 @@ def resolve_shipped(path: Path, name: str) -> Path:
 
 
 def shipped_files() -> Iterator[tuple[PurePosixPath, Path]]:
-    """Yield every TOML file of the folders with its place there, without ``.toml``."""
+    """Yield (path in its folder without ``.toml``, full path) of every shipped TOML file."""
     for folder in example_folders():
         for path in sorted(folder.rglob("*.toml")):
             yield PurePosixPath(path.relative_to(folder).with_suffix("").as_posix()), path
 
 
 def find_shipped_files(name: str) -> list[Path]:
-    """Return the shipped files that a name may mean: the one of that path, or all of that stem.
+    """Return shipped TOML files a name can mean: the one at that path, or all so named.
 
     Names are ``first_light`` or ``systems/oasys``, with ``.toml`` or without.
     """

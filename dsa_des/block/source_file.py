@@ -21,14 +21,14 @@ _UNFINDABLE = (ImportError, AttributeError, TypeError, ValueError, OSError)
 _FOUND: dict[str, str] = {}
 
 
-def search_folders(beside: Iterable[Path] = ()) -> list[str]:
-    """Return the folders looked in besides the module path, the working directory first."""
+def module_search_folders(beside: Iterable[Path] = ()) -> list[str]:
+    """Return absolute module folders besides ``sys.path``: working directory, then `beside`."""
     return list(dict.fromkeys(str(Path.cwd() / folder) for folder in (Path(), *beside)))
 
 
 @contextlib.contextmanager
 def append_to_module_path(folders: Sequence[str]) -> Iterator[None]:
-    """Put folders last on the module path, meanwhile, those that are not on it."""
+    """Append those folders that are not on ``sys.path`` to its end, while the context lasts."""
     added = [folder for folder in folders if folder not in sys.path]
     if added:
         importlib.invalidate_caches()
@@ -44,12 +44,12 @@ def append_to_module_path(folders: Sequence[str]) -> Iterator[None]:
 
 
 def folders_for_module(top: str, folders: Sequence[str]) -> Sequence[str]:
-    """Return the folders to search for a module: none if it is installed."""
+    """Return the folders to search for a module; none if it is installed."""
     return folders if _FOUND.get(top) in folders or not is_installed(top) else ()
 
 
 def is_installed(top: str) -> bool:
-    """Return whether a module is imported already or found on the module path."""
+    """Return whether a module is imported already or can be found on ``sys.path``."""
     try:
         return top in sys.modules or importlib.util.find_spec(top) is not None
     except _UNFINDABLE:
@@ -57,15 +57,15 @@ def is_installed(top: str) -> bool:
 
 
 def remember_module_folder(top: str, folders: Sequence[str]) -> None:
-    """Note in which of the folders a module was found."""
+    """Remember in which of the folders a module is found."""
     for folder in folders:
         if PathFinder.find_spec(top, [folder]) is not None:
             _FOUND[top] = folder
             return
 
 
-def find_other_module(top: str, folders: Sequence[str]) -> tuple[str, str] | None:
-    """Return the files of an imported module and of another of its name that is meant now.
+def find_conflicting_module(top: str, folders: Sequence[str]) -> tuple[str, str] | None:
+    """Return the files of the imported module and of a different one of that name meant now.
 
     None if what was imported is meant.
     """
@@ -84,7 +84,7 @@ def file_of(module_name: str, beside: Iterable[Path] = ()) -> str:
     Where there is none: ``there is no such module``, or the kind of module it is.
     """
     try:
-        spec = _find_module_spec(module_name, search_folders(beside))
+        spec = _find_module_spec(module_name, module_search_folders(beside))
     except _UNFINDABLE:
         spec = None
     if spec is None:
@@ -113,37 +113,37 @@ def _find_module_spec(module_name: str, folders: Sequence[str]) -> ModuleSpec | 
 _SUFFIX = ".py"
 
 
-def split_name(name: str) -> tuple[str, str]:
-    """Return the module or file, and the class, of ``module:Class`` or ``./file.py:Class``."""
+def split_type_name(name: str) -> tuple[str, str]:
+    """Return (module or file path, class name) of ``module:Class`` or ``./file.py:Class``."""
     file, _, class_name = name.rpartition(":")
-    if is_file(file):
+    if is_python_file_path(file):
         return file, class_name
     module, _, class_name = name.partition(":")
     return module, class_name
 
 
-def is_file(name: str) -> bool:
-    """Return whether a name is that of a file and not of a module: it holds a slash."""
+def is_python_file_path(name: str) -> bool:
+    """Return whether a name is a Python file's path (contains a slash), not a module."""
     return name.endswith(_SUFFIX) and ("/" in name or os.sep in name)
 
 
 def absolute_type_name(name: str) -> str:
-    """Return ``./file.py:Class`` with its file written out; other names as they are.
+    """Return ``./file.py:Class`` with its file's absolute path; return other names unchanged.
 
     A `SourcedText` knows the folder of the file that it was written in.
     """
-    file, class_name = split_name(name)
-    return f"{path_of(name)}:{class_name}" if is_file(file) else name
+    file, class_name = split_type_name(name)
+    return f"{absolute_file_path(name)}:{class_name}" if is_python_file_path(file) else name
 
 
-def path_of(name: str) -> Path:
-    """Return the file of ``./file.py:Class``."""
-    file = os.path.expanduser(split_name(name)[0])
+def absolute_file_path(name: str) -> Path:
+    """Return the absolute path of the file in ``./file.py:Class``."""
+    file = os.path.expanduser(split_type_name(name)[0])
     return Path(os.path.abspath(Path(getattr(name, "folder", "")) / file))
 
 
 def missing_file_reason(path: Path) -> str:
-    """Return what is wrong with a file that cannot be imported from; nothing if it is there."""
+    """Return why a module's file cannot be imported, such as none there; empty if it is there."""
     try:
         if path.is_file():
             return ""

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, is_single_run, positions_among
+from dsa_des.arrays.run_ticks import RunTicks, is_shared_single_run, positions_with_found_mask
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 
@@ -93,23 +93,23 @@ class Wake:
 
     @cached_property
     def demand(self) -> Mapping[str, IntArray]:
-        """The rows at which each clocked block downstream scans."""
+        """The rows of this wake at which each clocked block downstream scans, by block name."""
         return {} if self._demand is None else self._demand()
 
     @property
     def idle(self) -> BoolArray:
-        """Whether nothing came at each row, which the block asked for all the same."""
+        """Mask of rows without messages, run only because of `Component.acts_every_s`."""
         return np.zeros(len(self), dtype=bool) if self._idle is None else self._idle
 
     def without_idle(self) -> "Wake | None":
-        """Return the rows that are not idle as a wake of their own; None without any."""
+        """Return the wake without its idle rows: itself if none is idle, None if all are."""
         if self._idle is None or not self._idle.any():
             return self
         rows = np.flatnonzero(~self._idle)
-        return self.part(rows, self._arrived) if len(rows) else None
+        return self.select_rows(rows, self._arrived) if len(rows) else None
 
-    def part(self, rows: IntArray, arrived: Mapping[str, list[Arrivals]]) -> "Wake":
-        """Return some of the rows as a wake of their own, with some of what arrived."""
+    def select_rows(self, rows: IntArray, arrived: Mapping[str, list[Arrivals]]) -> "Wake":
+        """Return a wake of the rows at the given indices, with `arrived` as its arrivals."""
         held = {port: (message, of[rows]) for port, (message, of) in self._held.items()}
 
         def demand() -> dict[str, IntArray]:
@@ -118,14 +118,15 @@ class Wake:
             }
 
         return Wake(
-            self.instants.part(rows), self.scans[rows], self.ticks_per_s, held, arrived, demand,
+            self.instants.take_with_known_positions(rows), self.scans[rows], self.ticks_per_s,
+            held, arrived, demand,
             first_run=self.first_run, clock=self._clock,
             idle=None if self._idle is None else self._idle[rows],
         )  # fmt: skip
 
     @cached_property
-    def scans_before(self) -> IntArray:
-        """When the block's scan before each row was, in ticks of its own run; -1 for none."""
+    def previous_scan_tick(self) -> IntArray:
+        """The tick of the block's scan before each row, in the row's run; -1 if there is none."""
         if self._clock is None:
             return np.full(len(self), -1)
         return self._clock(self.scans, self.run)
@@ -136,7 +137,9 @@ class Wake:
         return self.ticks / self.ticks_per_s
 
     def held(self, port: str) -> tuple[Any, IntArray] | None:
-        """Return ``(message, rows)``: row ``rows[i]`` is held at instant i (-1: none yet)."""
+        """Return ``(message, rows)`` of an input: row ``rows[i]`` is the latest at instant i (-1 if
+        none has arrived); None if the input holds nothing.
+        """
         return self._held.get(port)
 
     def __getitem__(self, port: str) -> Any:
@@ -161,7 +164,7 @@ class Wake:
 
 
 def messages_by_output(result: Any, outputs: Collection[str]) -> Mapping[str, Message]:
-    """Return what a block returned as messages by output name; a lone one goes to the only output.
+    """Return a block's messages by output, a dict; a single message is the only output's.
 
     TypeError if a lone message could go to several outputs.
     """
@@ -180,7 +183,7 @@ def messages_by_output(result: Any, outputs: Collection[str]) -> Mapping[str, Me
 def checked_messages(
     result: Any, outputs: Mapping[str, Any], ran: RunTicks
 ) -> Iterator[tuple[str, Message]]:
-    """Give what a block returned when it ran, by output; messages without rows are left out.
+    """Yield (output, message) of all returned messages that have rows, after checking them.
 
     TypeError or ValueError if one is not what its output declares, or of other instants than `ran`.
     """
@@ -200,28 +203,28 @@ def checked_messages(
 
 
 def _set_runs(port: str, message: Message, ran: RunTicks) -> Message:
-    """Return a message that says of which runs its rows are, if its block does not say it.
+    """Return the message with the run number of each row, set here if the block did not set it.
 
     Rows that are not of instants at which the block ran, in order, are refused: what a row is dated
     with is when it was made, which decides when it arrives and where it stands in the recording.
     """
     sent = message.tick
     if sent is ran.tick:
-        message = message if is_single_run(ran.run) else copy(message)
+        message = message if is_shared_single_run(ran.run) else copy(message)
         message.instants = ran  # with what is known of them
         return message
     if sent.dtype == np.int64:
-        if not is_single_run(ran.run) and is_single_run(message.run):
+        if not is_shared_single_run(ran.run) and is_shared_single_run(message.run):
             if ran.is_one_run:
-                message = message.of_runs(np.full(len(sent), ran.run[0], dtype=np.int64))
+                message = message.with_runs(np.full(len(sent), ran.run[0], dtype=np.int64))
             elif np.array_equal(sent, ran.tick):
-                message = message.of_runs(ran.run)
+                message = message.with_runs(ran.run)
             else:
                 raise ValueError(
                     f"output {port!r} has {len(sent)} rows, and the wake {len(ran)} of several "
                     "runs: the message must say of which run each is (`run = wake.run[rows]`)"
                 )
-        position, there = positions_among(ran, message.instants)
+        position, there = positions_with_found_mask(ran, message.instants)
         if there is None and bool((position[1:] >= position[:-1]).all()):
             return message
     raise ValueError(

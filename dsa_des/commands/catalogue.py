@@ -17,7 +17,12 @@ from dsa_des.block.shipped_files import example_folders
 from dsa_des.commands.parameters import Row, parameter_rows, scene_tables
 from dsa_des.errors import OutputError, UsageError, did_you_mean, nearest_name
 from dsa_des.files.output_file import temporary_folder
-from dsa_des.files.output_names import absolute_location, check_folder_path, reason_of, user_path
+from dsa_des.files.output_names import (
+    absolute_location,
+    check_folder_path,
+    system_error_text,
+    user_path,
+)
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.examples import Example, examples
 from dsa_des.terminal import terminal
@@ -65,7 +70,7 @@ def show_components(name: str | None, key: str | None = None) -> None:
 
 
 def _rows_of_key(name: str, key: str | None, rows: list[Row]) -> list[Row]:
-    """Return the row of one key and of what is inside it; all rows without a key."""
+    """Return the rows of one key and of the keys inside it; all rows if no key is given."""
     if key is None:
         return rows
     matches = [row for row in rows if f"{row[0].strip()}.".startswith(f"{key}.")]
@@ -120,7 +125,7 @@ def _first_sentence(cls: type[Component]) -> str:
 
 
 def _print_type(console: Any, name: str, cls: type[Component]) -> None:
-    console.print(Text.assemble((printable(name), "bold"), f"  {printable(cls.path())}"))
+    console.print(Text.assemble((printable(name), "bold"), f"  {printable(cls.import_path())}"))
     console.print(Text(inspect.cleandoc(cls.__doc__ or "")))
     console.print()
     console.print(f"look-ahead windows: {'yes' if cls.windowed else 'no'}", highlight=False)
@@ -148,7 +153,7 @@ def _print_type(console: Any, name: str, cls: type[Component]) -> None:
 
 
 def _describe_hooks(console: Any, cls: type[Component]) -> None:
-    """Print what effects may act on, how they are called there, and which effects do."""
+    """Print the quantities that effects can act on, their call, and which effects do."""
     hooks = cls.all_hooks()
     if not hooks:
         return
@@ -158,7 +163,7 @@ def _describe_hooks(console: Any, cls: type[Component]) -> None:
         hook: ", ".join(effect.name for effect in cls.effects if effect.acts_on == hook)
         for hook in hooks
     }
-    rows = [(f"  {hook}", hook.sentence(), acting[hook] or "-") for hook in sorted(hooks)]
+    rows = [(f"  {hook}", hook.signature_text(), acting[hook] or "-") for hook in sorted(hooks)]
     _print_rows(console, ("  hook", "what it calls", "effects"), rows)
 
 
@@ -183,7 +188,7 @@ _CODE = "__pycache__"
 
 
 def show_examples(copy: str | None) -> None:
-    """List all shipped scenes, studies and cases, or copy their folders with what they extend."""
+    """Print a list of all shipped scenes, studies and cases, or copy their folders to `copy`."""
     if copy is not None:
         _copy_example_folders(user_path(copy, _OPTION))
         return
@@ -225,12 +230,14 @@ def _copy_example_folders(target: Path) -> None:
                 path.rmdir()
             copied.rename(path)
     except OSError as error:
-        raise OutputError(f"{_OPTION} {target}: cannot be written: {reason_of(error)}") from error
+        raise OutputError(
+            f"{_OPTION} {target}: cannot be written: {system_error_text(error)}"
+        ) from error
     say(f"{target}: {count} files")
 
 
 def _copy_files(source: Path, into: Path) -> int:
-    """Copy the content of files, not their permissions."""
+    """Copy all files below a folder (content, not permissions); return how many there were."""
     files = [path for path in sorted(source.rglob("*")) if path.is_file()]
     files = [path for path in files if _CODE not in path.parts]
     for path in files:

@@ -14,32 +14,36 @@ from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.source_file import absolute_type_name
 from dsa_des.commands.study import (
     check_workers,
+    exit_if_runs_crashed,
     options_as_sets,
-    report_crashes,
     report_finished_study,
-    result_names,
-    run_into,
+    run_study_into_folder,
     show_study,
+    summarised_result_names,
 )
 from dsa_des.commands.what_changed import ConditionPair, print_changes, print_changes_along_axis
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_folder import new_folder
+from dsa_des.files.output_folder import make_results_folder
 from dsa_des.results.curves import draw_scatter
-from dsa_des.results.differences import estimate_difference, paired_units, subtract_without_rounding
-from dsa_des.results.figures import safe_name
+from dsa_des.results.differences import (
+    estimate_difference,
+    paired_unit_means,
+    second_minus_first_without_rounding,
+)
+from dsa_des.results.figures import safe_file_name
 from dsa_des.results.folder import STUDY_JSON, StudyFolder
 from dsa_des.results.labels import short_text
-from dsa_des.results.printing import round_estimate
+from dsa_des.results.printing import rounded_value_and_interval
 from dsa_des.results.record import StudyRecord
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
-from dsa_des.studies.identity import record_of, results_of
 from dsa_des.studies.metric import METRICS
 from dsa_des.studies.runner import tables_of
-from dsa_des.studies.study import MetricSpec, Study, command_of
+from dsa_des.studies.study import MetricSpec, Study, portable_command_line
+from dsa_des.studies.study_digest import record_of, results_of
 from dsa_des.studies.study_file import read_study, study_of_scene
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
@@ -54,23 +58,23 @@ _REPLICAS = 20
 
 @dataclass(frozen=True)
 class _OfAll:
-    """What the command line changes of all that is compared."""
+    """The options of the command line that change every scene or study that is compared."""
 
     sets: tuple[str, ...]
     seed: int | None
     replicas: int | None
 
-    def study(self, path: Path, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
-        """Return the study of a study file, or that of a scene."""
+    def load_study(self, path: Path, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
+        """Return the study that a study file describes, or one made of a scene file."""
         if _is_study(path):
             sets = (*self.sets, *options_as_sets((), self.seed, self.replicas))
             return read_study(path, swaps, sets)
         replicas = _REPLICAS if self.replicas is None else self.replicas
-        metrics = self._applicable(path, swaps)
+        metrics = self._applicable_metrics(path, swaps)
         return study_of_scene(path, replicas, metrics, swaps, self.sets, self.seed or 0)
 
-    def _applicable(self, path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]:
-        """Return the metrics that a scene has everything for, with each of the swaps."""
+    def _applicable_metrics(self, path: Path, swaps: Sequence[tuple[str, list[str]]]) -> list[str]:
+        """Return the metrics measurable in the scene as it is and with each of the swaps."""
         scenes = [load_scene(path, sets=self.sets)]
         for block, types in swaps:
             scenes.append(load_scene(path, sets=self.sets, swaps=[f"{block}={types[-1]}"]))
@@ -97,7 +101,7 @@ def compare_command(
     workers: int | None,
     out: str | None,
 ) -> None:
-    """Compare what the command line names."""
+    """Run the scenes or studies that the command line names and print how their results differ."""
     if replicas is not None and replicas < 1:
         raise UsageError(f"--replicas is {replicas}: it must be 1 or more")
     check_workers(workers)
@@ -109,12 +113,12 @@ def compare_command(
         if len(paths) != 1:
             raise UsageError("--swap compares one scene or study with itself: name one file")
         file = find_input_file(paths[0])
-        repeat = command_of(words, sets, file)
+        repeat = portable_command_line(words, sets, file)
         tables = _compare_swap(file, swaps, changes, results, workers, out, repeat)
-        report_crashes(tables, _ANEW)
+        exit_if_runs_crashed(tables, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
-        show_study(Path(paths[0]), results, _print_changes_first(results))
+        show_study(Path(paths[0]), results, _changes_printer(results))
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
@@ -122,12 +126,12 @@ def compare_command(
     studies = [_load_study(path, changes) for path in files]
     for study in studies:
         if isinstance(study, Study):
-            study.repeat = command_of(words, sets, *files)
+            study.repeat = portable_command_line(words, sets, *files)
     for study in studies:
         record = record_of(study) if isinstance(study, Study) else study
-        result_names(record.results, results)
+        summarised_result_names(record.results, results)
     by_path: dict[Path, Tables] = {}  # what is named twice is run once
-    with new_folder(out, _HOME, "compare") as home:
+    with make_results_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
             if file.resolve() not in by_path:
                 by_path[file.resolve()] = _tables_of_path(file, study, workers, home)
@@ -135,7 +139,7 @@ def compare_command(
         for number, (other, path) in enumerate(zip(tables[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(tables) == 2 else f"scatter-{number}"
             _print_comparison(tables[0], other, (paths[0], path), results, home / stem)
-    report_crashes(list(by_path.values()), _ANEW)
+    exit_if_runs_crashed(list(by_path.values()), _ANEW)
 
 
 def _compare_swap(
@@ -149,7 +153,11 @@ def _compare_swap(
 ) -> list[Tables]:
     """Run a scene or study with and without swaps, and compare the two."""
     chosen: list[tuple[str, list[str]]] = []
-    scene = changes.study(path).scene(0) if _is_study(path) else load_scene(path, sets=changes.sets)
+    scene = (
+        changes.load_study(path).scene(0)
+        if _is_study(path)
+        else load_scene(path, sets=changes.sets)
+    )
     for swap in swaps:
         block, equals, name = swap.partition("=")
         if not equals or not name:
@@ -162,12 +170,12 @@ def _compare_swap(
         if own == name:
             raise UsageError(f"--swap {swap}: {block} is a {name} already")
         chosen.append((block, [own, name]))
-    study = changes.study(path, chosen)
+    study = changes.load_study(path, chosen)
     study.repeat = repeat
-    result_names(results_of(study), results)
-    with new_folder(out, _HOME, "compare") as home:
-        folder = run_into(study, home, workers, resume=False, again=_ANEW)
-    tables = report_finished_study(study, folder, only=results, first=_print_changes_first(results))
+    summarised_result_names(results_of(study), results)
+    with make_results_folder(out, _HOME, "compare") as home:
+        folder = run_study_into_folder(study, home, workers, resume=False, again=_ANEW)
+    tables = report_finished_study(study, folder, only=results, first=_changes_printer(results))
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.comparisons_with_baseline(f"swap.{block}", own):
         for metric in tables.notable_results(results):
@@ -177,7 +185,7 @@ def _compare_swap(
     return [tables]
 
 
-def _print_changes_first(results: Sequence[str]) -> Callable[[Tables], None]:
+def _changes_printer(results: Sequence[str]) -> Callable[[Tables], None]:
     return lambda tables: print_changes_along_axis(tables, results)
 
 
@@ -187,9 +195,9 @@ def _is_study(path: Path) -> bool:
 
 
 def _load_study(path: Path, changes: _OfAll) -> Study | StudyRecord:
-    """Return the study of a study file or a scene, or what a folder says of its own."""
+    """Return the study of a study file or scene file, or the record of finished runs."""
     if not _is_folder(path):
-        return changes.study(path)
+        return changes.load_study(path)
     if changes.sets or changes.seed is not None or changes.replicas is not None:
         raise UsageError(
             f"{path}: is a folder of finished runs: --set, --seed and --replicas cannot change it"
@@ -207,12 +215,12 @@ def _is_folder(path: Path) -> bool:
 def _tables_of_path(
     path: Path, study: Study | StudyRecord, workers: int | None, home: Path
 ) -> Tables:
-    """Return the tables of a study's folder, or run the study or scene first."""
+    """Return result tables of a folder of finished runs, or run the study below `home` first."""
     if not isinstance(study, Study):
         return Tables(study, StudyFolder(path))
     number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
     target = home / f"{path.stem[:100]}-{number}"
-    folder = run_into(study, target, workers, resume=False, again=_ANEW)
+    folder = run_study_into_folder(study, target, workers, resume=False, again=_ANEW)
     return tables_of(study, folder)
 
 
@@ -221,10 +229,10 @@ def _results_to_show(tables: Tables, only: Sequence[str]) -> list[str]:
 
 
 def _list_farthest_runs(metric: str, pair: ConditionPair, names: tuple[str, str]) -> None:
-    """List the runs in which a result differs most, with a command that opens each."""
-    first, second = pair.values(metric)
+    """Print the runs in which two studies differ most in a result, with a command for each."""
+    first, second = pair.paired_values(metric)
     known = np.flatnonzero(~np.isnan(first - second))
-    changes = subtract_without_rounding(first[known], second[known])
+    changes = second_minus_first_without_rounding(first[known], second[known])
     changed = [
         (-abs(change), pair.keys[run], run)
         for change, run in zip(changes.tolist(), known.tolist(), strict=True)
@@ -245,7 +253,7 @@ def _list_farthest_runs(metric: str, pair: ConditionPair, names: tuple[str, str]
 def _print_comparison(
     one: Tables, other: Tables, names: tuple[str, str], only: Sequence[str], stem: Path
 ) -> None:
-    """Print paired differences of two studies over the places and units that both have."""
+    """Print and draw two studies' paired differences at common axis values and runs."""
     if one.rows.axes != other.rows.axes or one.rows.over != other.rows.over:
         raise UsageError(
             f"{names[0]} and {names[1]} have different axes ({one.rows.axes + one.rows.over} and "
@@ -275,13 +283,14 @@ def _print_comparison(
         codes = {name: code for code, name in enumerate(dict.fromkeys(names_of))}
         units = np.array([codes[name] for name in names_of], dtype=np.int64)
         for metric in metrics:
-            pair = paired_units(units, *runs.values(metric))[1:]
+            pair = paired_unit_means(units, *runs.paired_values(metric))[1:]
             d = estimate_difference(
                 *pair, one.record.confidence, one.record.interval, kind=kinds[metric]
             )
             lines.append(
-                [*map(short_text, at), metric, *round_estimate(d.paired), str(d.paired.count),
-                 round_estimate(d.unpaired)[1].rstrip(" *")]
+                [*map(short_text, at), metric, *rounded_value_and_interval(d.paired),
+                str(d.paired.count),
+                 rounded_value_and_interval(d.unpaired)[1].rstrip(" *")]
             )  # fmt: skip
             together.setdefault(metric, []).append(pair)
     shown = [r for r in one.results if r.name in known and (not only or r.name in only)]
@@ -298,7 +307,7 @@ def _print_comparison(
     try:
         stem.parent.mkdir(parents=True, exist_ok=True)
         for metric, pairs in together.items():
-            path = stem.with_name(f"{safe_name(f'{stem.name}-{metric}')}.png")
+            path = stem.with_name(f"{safe_file_name(f'{stem.name}-{metric}')}.png")
             x, y = (np.concatenate([pair[k] for pair in pairs]) for k in (0, 1))
             drawn = io.BytesIO()
             draw_scatter(drawn, x, y, names, metric, "compared")

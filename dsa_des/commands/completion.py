@@ -18,28 +18,28 @@ from dsa_des.scene.scene import Scene, load_scene
 
 
 def scenes(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return shipped scenes, and leave files to the shell."""
+    """Return shipped scenes that begin with the typed text; files are left to the shell."""
     return _complete_shipped("scene", incomplete)
 
 
 def studies(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return shipped studies, and leave files to the shell; the further commands at first."""
+    """Return further commands, else shipped studies, that begin with the text; no file names."""
     further = [CompletionItem(name) for name in ("report", "show") if name.startswith(incomplete)]
     return further or _complete_shipped("study", incomplete)
 
 
 def examples(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return shipped scenes and studies, and leave files to the shell."""
+    """Return shipped scenes and studies that begin with the text; files are the shell's."""
     return _complete_shipped("scene", incomplete) + _complete_shipped("study", incomplete)
 
 
 def cases(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return shipped cases, and leave files to the shell."""
+    """Return the shipped cases that begin with the typed text; file names are left to the shell."""
     return _complete_shipped("case", incomplete)
 
 
 def types(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return block types, their kinds and the tables of scenes."""
+    """Return block types, their kinds and scene tables that begin with the typed text."""
     names = entry_points_of()
     return _completion_items(
         {*names, *(name.partition(".")[0] for name in names), *scene_tables()}, incomplete
@@ -47,7 +47,7 @@ def types(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
 
 
 def keys_of_type(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return the keys of the block type that was named before."""
+    """Return keys that begin with the text, of the block type named earlier on the line."""
     try:
         return _completion_items(
             _parameter_keys(find_component(str(ctx.params.get("name")))), incomplete
@@ -57,7 +57,7 @@ def keys_of_type(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
 
 
 def keys(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return the keys that the scene named before has, as far as ``blocks.NAME.`` is typed."""
+    """Return keys with ``=``, that begin with the text, of the scene earlier on the line."""
     scene = _read_typed_scene(ctx)
     if scene is None:
         return []
@@ -68,7 +68,7 @@ def keys(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
 
 
 def swaps(ctx: click.Context, incomplete: str) -> list[CompletionItem]:
-    """Return the blocks of the scene named before, or the types of one's kind."""
+    """Return ``BLOCK=TYPE`` completions: the earlier scene's blocks, then types of that kind."""
     scene = _read_typed_scene(ctx)
     name, equals, begin = incomplete.partition("=")
     if not equals:
@@ -91,7 +91,7 @@ def _parameter_keys(cls: type[Component]) -> list[str]:
 
 
 def _read_typed_scene(ctx: click.Context) -> Scene | None:
-    """Return the scene that the words before name, if it can be read."""
+    """Return the scene that is named earlier on the command line, or None if it cannot be read."""
     name: Any = ctx.params.get("scene") or next(iter(ctx.params.get("paths") or ()), None)
     if name is None and ctx.args:
         name = ctx.args[0]

@@ -7,12 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import NotImportable, load_named
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find_component
-from dsa_des.costs.climb import Comparison, RungCost, climb, inapplicable_reason, parse_budgets
+from dsa_des.block.shadowed_packages import NotImportable, load_named
+from dsa_des.costs.climb import (
+    Comparison,
+    RungCost,
+    inapplicable_reason,
+    measure_rungs,
+    parse_budgets,
+)
 from dsa_des.costs.cost_report import draw_costs, print_chain_and_notes, print_ladder, write_table
-from dsa_des.costs.replay import RungRun, run_watched
+from dsa_des.costs.replay import RungRun, run_with_recorded_wakes
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_folder import OutputFolder
@@ -71,19 +77,21 @@ def cost_of_accuracy(
     climbs, notes = ladders_to_climb(variants, block, against)
     limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
     target = OutputFolder.from_option(out, Path("runs"), f"{variants.scene.path.stem}-cost")
-    compare = comparison()
+    compare = comparison_of_all_reports()
     costs: list[RungCost] = []
     chain: list[dict[str, Any]] = []
     stopped = False
-    with target.writing() as folder:
+    with target.write_then_rename() as folder:
         progress = CostProgress(silent=as_json)
         try:
-            own = run_watched(variants.scene, {name for name, _ in climbs})
-            progress.say(describe_duration(climbs, own, repeats), always=True)
+            own = run_with_recorded_wakes(variants.scene, {name for name, _ in climbs})
+            progress.print_if_due(describe_duration(climbs, own, repeats), always=True)
             for number, (name, ladder) in enumerate(climbs, 1):
-                progress.say(f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ...")
+                progress.print_if_due(
+                    f"{name}: {ladder.name} ({number} of {len(climbs)} ladders) ..."
+                )
                 try:
-                    rungs = climb(variants, name, ladder, against=against, repeats=repeats,
+                    rungs = measure_rungs(variants, name, ladder, against=against, repeats=repeats,
                                   budgets=limits, compare=compare, own=own[name])  # fmt: skip
                 except Unavailable as error:
                     notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
@@ -100,10 +108,10 @@ def cost_of_accuracy(
         if not no_figures:
             draw_costs(folder / "cost.png", variants.scene.title, costs)
         if whole_chain and not stopped:
-            from dsa_des.costs.chain import draw_chain, run_chain
+            from dsa_des.costs.chain import draw_chain, run_rung_combinations
 
-            progress.say("whole chain ...")
-            chain, picked = run_chain(variants, costs, compare)
+            progress.print_if_due("whole chain ...")
+            chain, picked = run_rung_combinations(variants, costs, compare)
             notes.append(picked)
             write_table(folder / "chain.parquet", chain)
             label = compare.difference.label
@@ -132,7 +140,9 @@ def describe_duration(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) 
         return "no ladder to climb"
     others = sum(len(ladder.rungs) - 1 for _, ladder in climbs)
     run_s = next(iter(own.values())).run_cpu_s
-    timing_s = sum(len(ladder.rungs) * own[name].timing_s(repeats) for name, ladder in climbs)
+    timing_s = sum(
+        len(ladder.rungs) * own[name].expected_timing_s(repeats) for name, ladder in climbs
+    )
     return (
         f"about {others * run_s + timing_s:.0f} s: {others} runs of {run_s:.2g} s and "
         f"{timing_s:.0f} s of timing, if each model costs as much as the scene's own; dearer ones "
@@ -141,13 +151,13 @@ def describe_duration(climbs: Climbs, own: Mapping[str, RungRun], repeats: int) 
 
 
 class CostProgress:
-    """Says what is measured: every step on a terminal, elsewhere one every ten seconds."""
+    """Prints what is being measured: every step on a terminal, elsewhere one every ten seconds."""
 
     def __init__(self, silent: bool) -> None:
         self._silent, self._last_s = silent, time.monotonic()
 
-    def say(self, text: str, always: bool = False) -> None:
-        """Say what is begun."""
+    def print_if_due(self, text: str, always: bool = False) -> None:
+        """Print what is measured now, unless too soon after the last text; `always` forces it."""
         now_s = time.monotonic()
         due = always or sys.stderr.isatty() or now_s - self._last_s > _QUIET_S
         if not self._silent and due:
@@ -158,7 +168,7 @@ class CostProgress:
 def ladders_to_climb(
     variants: Variants, block: str | None, against: str | None
 ) -> tuple[Climbs, list[str]]:
-    """Return the ladders to climb, and notes on those that change nothing in this scene."""
+    """Return (block, ladder) pairs to run, and notes on ladders that change nothing here."""
     blocks = variants.scene.blocks
     if block is not None and block not in blocks:
         raise UsageError(
@@ -196,14 +206,14 @@ def ladders_to_climb(
     return climbs, notes
 
 
-def comparison() -> Comparison:
-    """Return what tells runs apart: all registered reports together."""
+def comparison_of_all_reports() -> Comparison:
+    """Return a comparison of two runs that uses all registered reports."""
     return Comparison(load_reports())
 
 
 def _draw_maps(name: str, out: str | None) -> None:
     """Draw the error maps of the ladders of one type, or of all types that begin with ``NAME.``."""
-    functions = _map_functions()
+    functions = _map_function_names()
     if name not in functions:
         raise UsageError(f"--map {name}: no ladder draws such a map{did_you_mean(name, functions)}")
     try:
@@ -211,14 +221,14 @@ def _draw_maps(name: str, out: str | None) -> None:
     except NotImportable as error:
         raise UsageError(f"--map {name}: {functions[name]} cannot be loaded: {error}") from error
     target = OutputFolder.from_option(out, Path("runs"), f"map-{name}")
-    with target.writing() as folder:
+    with target.write_then_rename() as folder:
         paths = [Path(path).name for path in draw(folder)]
         write_run_json(folder, {"map": name})
     say(f"{target.path}: {', '.join(paths)}")
 
 
-def _map_functions() -> dict[str, str]:
-    """Return the map function of each family of block types, ``geometry`` for ``geometry.*``."""
+def _map_function_names() -> dict[str, str]:
+    """Return family of block types (``geometry`` for ``geometry.*``) → name of its error map."""
     functions: dict[str, str] = {}
     for type_name in entry_points_of():
         try:

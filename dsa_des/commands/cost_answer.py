@@ -14,17 +14,17 @@ from dsa_des.answers.alternatives import (
 )
 from dsa_des.answers.changes import changes_by_model
 from dsa_des.answers.figure import draw_answers
-from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, split_into_turns
+from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, split_into_batches
 from dsa_des.answers.report import AnswerReport, print_report
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
 from dsa_des.commands.study import (
     check_workers,
+    choose_output_folder,
+    exit_with_resume_hint,
     options_as_sets,
-    output_folder_of,
     require_empty_or_resumed,
-    result_names,
-    stop_with,
+    summarised_result_names,
 )
 from dsa_des.costs.cost_report import write_table
 from dsa_des.errors import UsageError
@@ -35,8 +35,8 @@ from dsa_des.results.record import Result
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.examples import find_input_file
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.identity import description_text, results_of
-from dsa_des.studies.study import Study, command_of
+from dsa_des.studies.study import Study, portable_command_line
+from dsa_des.studies.study_digest import results_of, study_json_text
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal.terminal import say, say_json
 from dsa_des.text.safe_text import shell_line
@@ -88,9 +88,9 @@ def cost_at_the_answer(
     )
     words += _as_options("block", [block] if block else [])
     words += _as_options("repeats", [str(repeats)] if repeats else [])
-    described.repeat = command_of(["cost", *words], sets, described.path)
+    described.repeat = portable_command_line(["cost", *words], sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
-    target = output_folder_of(Path("runs"), f"{path.stem}-cost", out, resume)
+    target = choose_output_folder(Path("runs"), f"{path.stem}-cost", out, resume)
     require_empty_or_resumed(target, resume, "what was begun there")
     folder = target if isinstance(target, Path) else target()
     words += [*_as_options("workers", [str(workers)] if workers else []), "--out", str(folder)]
@@ -98,8 +98,8 @@ def cost_at_the_answer(
     again = shell_line(["dsa-des", "cost", "--resume", *words, "--", scene])
     progress = CostProgress(silent=as_json)
     stopped = answer.run(folder, workers or default_workers(), progress, resume)
-    if stopped and not answer.has_changes():
-        stop_with("interrupted in the first turn", again, 130)
+    if stopped and not answer.has_model_runs():
+        exit_with_resume_hint("interrupted in the first turn", again, 130)
     report = answer.report()
     rows = report.rows()
     said = {name: report.sentences(name) for name in report.verdicts}
@@ -119,7 +119,7 @@ def cost_at_the_answer(
         say()
         say(f"{folder}: {', '.join(sorted(one.name for one in folder.iterdir()))}")
     if stopped:
-        stop_with(f"interrupted after {answer.done_text()}", again, 130)
+        exit_with_resume_hint(f"interrupted after {answer.done_text()}", again, 130)
 
 
 def _as_options(option: str, values: Sequence[str]) -> list[str]:
@@ -139,7 +139,7 @@ class AnswerOfStudy:
         repeats: int | None = None,
     ) -> None:
         results = results_of(study)
-        result_names(results, answers, "--answer")
+        summarised_result_names(results, answers, "--answer")
         self._results: list[Result] = [
             next(result for result in results if result.name == name)
             for name in dict.fromkeys(answers)
@@ -164,7 +164,7 @@ class AnswerOfStudy:
             )
         self.study = add_model_axis(plain, found.these)
         self._repeats = repeats
-        self._batches: list[Batch] = split_into_turns(self.study, repeats)
+        self._batches: list[Batch] = split_into_batches(self.study, repeats)
         self.turn_times = TurnTimes()
         self._failed: dict[str, str] = {}
         self._folder: StudyFolder | None = None
@@ -178,8 +178,8 @@ class AnswerOfStudy:
                              f"differ{more}")  # fmt: skip
 
     @property
-    def comparisons(self) -> int:
-        """How many intervals hold together: models by results by places."""
+    def comparison_count(self) -> int:
+        """The number of intervals that must hold together: models times results times places."""
         return len(self._found.these) * len(self._results) * self._places
 
     def run(
@@ -195,7 +195,7 @@ class AnswerOfStudy:
             share = sum(end - start for _, start, end in self._batches[0]) / runs
             rest_s = cpu_s / share * (1 + models) - cpu_s
             with_so_many = "1 process" if workers == 1 else f"{workers} processes"
-            progress.say(
+            progress.print_if_due(
                 f"about {rest_s / workers:.0f} s with {with_so_many}, if each model costs as much "
                 "as the scene's own; dearer ones take longer. Ctrl-C keeps what is finished; "
                 "--block BLOCK or --set replicas=N asks for less",
@@ -204,16 +204,18 @@ class AnswerOfStudy:
 
         def next_models(done: int) -> list[int]:
             left = self._remaining_models()
-            self.turn_times.keep(path / _TURNS, len(self._batches))
+            self.turn_times.save(path / _TURNS, len(self._batches))
             report = self.report()
             going_on = done < len(self._batches)
-            progress.say(f"{self.done_text()}: {_count_text(report)}", always=going_on)
+            progress.print_if_due(
+                f"{self.done_text()}: {_verdict_counts_text(report)}", always=going_on
+            )
             return left
 
         try:
-            folder.open(description_text(self.study), resume=resume)
+            folder.open(study_json_text(self.study), resume=resume)
             before = self._resume_turns(path / _TURNS) if resume else 0
-            progress.say(
+            progress.print_if_due(
                 f"{models} models and the scene as it is, {runs:,} runs each, in "
                 f"{len(self._batches)} turns; the scene as it is goes first",
                 always=True,
@@ -230,25 +232,25 @@ class AnswerOfStudy:
         return False
 
     def _resume_turns(self, path: Path) -> int:
-        """Return how many turns an earlier attempt finished, in as many turns as it was to have."""
+        """Return how many turns an earlier attempt finished, and split the runs as it planned."""
         kept = self.turn_times.read_earlier(path)
         if kept is None:
             return 0
         done, turns = kept
         if self._repeats not in (None, turns):
             raise UsageError(f"--repeats {self._repeats}: {path.parent} was begun in {turns} turns")
-        self._batches = split_into_turns(self.study, turns)
+        self._batches = split_into_batches(self.study, turns)
         return done
 
-    def has_changes(self) -> bool:
-        """Return whether any model has runs that can be held against the scene as it is."""
+    def has_model_runs(self) -> bool:
+        """Return whether any model other than the scene's own has runs yet."""
         return any(model for _, model in self.turn_times.runs)
 
     def _name(self, model: int) -> str:
         return str(self.study.axes[-1].labels[model])
 
     def _remaining_models(self) -> list[int]:
-        """Return the models that gave results in the first turn, and keep why the others failed."""
+        """Return indices of models with results in turn one; remember why others failed."""
         assert self._folder is not None
         for table in self._folder.each_part(before_round=1):
             errors = table["error"].to_pylist()
@@ -263,7 +265,7 @@ class AnswerOfStudy:
                 if self._name(k) not in self._failed]  # fmt: skip
 
     def done_text(self) -> str:
-        """Return ``2 of 10 turns``."""
+        """Return how many turns are finished as text, such as ``2 of 10 turns``."""
         models = len(self._found.these) + 1 - len(self._failed)
         each = [
             sum(turn == k for turn, _ in self.turn_times.runs) for k in range(len(self._batches))
@@ -287,9 +289,9 @@ class AnswerOfStudy:
             results=self._results,
             limits=self._limits,
             confidence=study.confidence,
-            comparisons=self.comparisons,
+            comparisons=self.comparison_count,
             changes=changes_by_model(
-                rows, self._results, study.confidence, study.interval, self.comparisons
+                rows, self._results, study.confidence, study.interval, self.comparison_count
             ),
             turn_times=self.turn_times,
             failed=self._failed,
@@ -299,7 +301,7 @@ class AnswerOfStudy:
         )
 
 
-def _count_text(report: AnswerReport) -> str:
+def _verdict_counts_text(report: AnswerReport) -> str:
     every = [verdict for some in report.verdicts.values() for verdict in some]
     taken = sum(verdict.is_acceptable for verdict in every)
     kinds = [(BEYOND, "beyond the limit"), (OPEN, "open"), (NOTHING, "not compared")]

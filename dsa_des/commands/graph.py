@@ -6,9 +6,9 @@ from typing import Any, Unpack
 
 import networkx as nx
 
-from dsa_des.commands.scene import SceneOptions, load
+from dsa_des.commands.scene import SceneOptions, load_printing_notes
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import PICTURES, check_ending, check_file
+from dsa_des.files.output_file import PICTURES, check_file_ending, check_file_writable
 from dsa_des.files.output_names import user_path
 from dsa_des.record.drawing import draw_to_png, figure_text
 from dsa_des.running.grain import choose_grain
@@ -23,13 +23,13 @@ def show_graph(dot: bool, png: bool, out: str | None, **options: Unpack[SceneOpt
     """Print or draw the graph of a scene."""
     if dot and png:
         raise UsageError("give --dot or --png, not both")
-    loaded = load(**options)
+    loaded = load_printing_notes(**options)
     if dot:
         say_lines(to_dot(loaded))
     elif png:
         path = Path(f"{loaded.path.stem}-graph.png") if out is None else user_path(out)
-        check_ending(path, PICTURES)
-        check_file(path)
+        check_file_ending(path, PICTURES)
+        check_file_writable(path)
         draw_graph(loaded, path)
         say(f"wrote {path}")
     else:

@@ -18,7 +18,7 @@ import click
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.foreign_calls import error_with_kind, module_of_error
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say, say_lines
 from dsa_des.text.safe_text import printable
 
@@ -27,7 +27,7 @@ _OURS = ("dsa_des", "components", "click", "rich")
 
 
 def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
-    """Turn the errors a user can cause into one message without a traceback."""
+    """Return the command so wrapped that user errors print one message, no traceback, and exit."""
 
     @functools.wraps(command)
     def guarded(*args: Any, **kwargs: Any) -> None:
@@ -56,8 +56,8 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
 
 
 @contextmanager
-def plain_output() -> Iterator[None]:
-    """Say in one line that a file or our own output cannot be written, and end with exit code 1."""
+def exit_on_write_error() -> Iterator[None]:
+    """If a file or output cannot be written inside the context, print one line; exit with 1."""
     try:
         try:
             yield
@@ -82,8 +82,8 @@ HELP = getattr(click.exceptions, "NoArgsIsHelpError", ())
 
 
 @contextmanager
-def _printable_errors() -> Iterator[None]:
-    """Escape what click repeats of the arguments in its own errors."""
+def _escape_click_errors() -> Iterator[None]:
+    """Make the messages of click's errors printable, as they repeat what the user typed."""
     try:
         yield
     except HELP:
@@ -117,7 +117,7 @@ def scene_options(required: bool = True) -> Callable[[Callable[..., None]], Call
 
 
 def word_completer(what: str) -> Callable[[click.Context, click.Parameter, str], list[Any]]:
-    """Return what completes a word in a shell; `what` is a function of `completion`."""
+    """Return a shell completion function that calls `what` of `dsa_des.commands.completion`."""
 
     def complete(ctx: click.Context, param: click.Parameter, incomplete: str) -> list[Any]:
         from dsa_des.commands import completion
@@ -128,7 +128,7 @@ def word_completer(what: str) -> Callable[[click.Context, click.Parameter, str],
     return complete
 
 
-def _note_traceback(ctx: click.Context, param: click.Parameter, value: bool) -> None:
+def _store_traceback_option(ctx: click.Context, param: click.Parameter, value: bool) -> None:
     ctx.meta[_TRACEBACK] = value
 
 
@@ -137,7 +137,7 @@ traceback_option = click.option(
     "--traceback",
     is_flag=True,
     expose_value=False,
-    callback=_note_traceback,
+    callback=_store_traceback_option,
     help="Where a block fails, show the calls that led there.",
 )
 seed_option = click.option("--seed", type=int, metavar="N", help="Seed of all random draws.")
@@ -178,7 +178,7 @@ class WithSubcommands(click.Command):
     def make_context(
         self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any
     ) -> click.Context:
-        """Read the words after the command's own name."""
+        """Return the further command's click context if the first word names one, else ours."""
         if args and args[0] in self.commands:
             name = f"{info_name} {args[0]}"
             return self.commands[args[0]].make_context(name, args[1:], parent, **extra)
@@ -202,7 +202,7 @@ class PluginGroup(click.Group):
 
     def main(self, *args: Any, **kwargs: Any) -> Any:
         """Run a command and end the program."""
-        with plain_ending(), plain_output():
+        with exit_plainly_on_signal(), exit_on_write_error():
             try:
                 return super().main(*args, **kwargs)
             except UsageError as error:  # a registered command that cannot be imported
@@ -212,12 +212,12 @@ class PluginGroup(click.Group):
     # click turns KeyboardInterrupt into exit code 1 outside of these two.
     def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
         """Read the command line."""
-        with plain_ending(), _printable_errors():
+        with exit_plainly_on_signal(), _escape_click_errors():
             return super().make_context(*args, **kwargs)
 
     def invoke(self, ctx: click.Context) -> Any:
         """Run the command that the command line names."""
-        with plain_ending(), _printable_errors():
+        with exit_plainly_on_signal(), _escape_click_errors():
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -225,13 +225,13 @@ class PluginGroup(click.Group):
         return sorted({*super().list_commands(ctx), *entry_points_of(COMMANDS)})
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Return one command, our own first."""
+        """Return the command of this name: our own, else a registered one, else None."""
         own = super().get_command(ctx, cmd_name)
         if own is not None or cmd_name not in entry_points_of(COMMANDS):
             return own
-        from dsa_des.block.foreign import load_installed
+        from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 
-        command: Any = load_installed(entry_points_of(COMMANDS)[cmd_name])
+        command: Any = load_unnamed_entry_point(entry_points_of(COMMANDS)[cmd_name])
         if not isinstance(command, click.Command):
             raise click.ClickException(
                 f"the registered command {cmd_name!r} is not a click.Command"

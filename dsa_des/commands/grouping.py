@@ -15,19 +15,19 @@ from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
 
 _OURS = ("dsa_des", "components")
-#: Scans of the slowest clock that are run for `check_grouping`.
+#: Scans of the slowest clock that are run for `check_window_independence`.
 _SCANS_TO_GROUP = 8
 _DEADLINE_S = 60.0
 
 
 class _NotBack(Exception):
-    """A block has not returned within the time that it is given."""
+    """A block has not returned within the time allowed."""
 
     exit_code = 2
 
 
-def check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
-    """Run a few scans one by one and all at once: a stranger's block must not see which it is."""
+def check_window_independence(loaded: Scene, again: Callable[..., Scene]) -> None:
+    """Raise SceneError if a foreign block's results depend on scans run singly or all at once."""
     strangers = [
         name
         for name, block in loaded.blocks.items()
@@ -41,7 +41,7 @@ def check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
     whole = again(duration=str(min(length, loaded.duration_s or length)))
     recorded = []
     try:
-        with _deadline(_DEADLINE_S):
+        with _interrupt_after(_DEADLINE_S):
             for window in (1, None):
                 tables = MemorySink()
                 Simulation(whole, window=window, recorder=Recorder([tables])).run()
@@ -60,8 +60,8 @@ def check_grouping(loaded: Scene, again: Callable[..., Scene]) -> None:
 
 
 @contextmanager
-def _deadline(limit_s: float) -> Iterator[None]:
-    """Interrupt whatever runs too long, where the system has a timer for that."""
+def _interrupt_after(limit_s: float) -> Iterator[None]:
+    """Raise `_NotBack` in the context after `limit_s` seconds, where the system has a timer."""
     ours = threading.current_thread() is threading.main_thread()
     if not ours or not hasattr(signal, "setitimer"):
         yield

@@ -15,7 +15,7 @@ from pydantic_core import PydanticUndefined
 from dsa_des.block.parameters import nested_models
 from dsa_des.block.registry import section_models
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
-from dsa_des.scene.changes import may_change
+from dsa_des.scene.changes import changeable_keys
 from dsa_des.stretches.outage import Outage
 
 _UNITS = {
@@ -30,7 +30,7 @@ def parameter_rows(
     model: type[BaseModel], prefix: str = ""
 ) -> list[tuple[str, str, str, str, str]]:
     """Return name, type with bounds, unit, default and meaning of every parameter."""
-    rows, changing = [], may_change(model)
+    rows, changing = [], changeable_keys(model)
     for name, info in model.model_fields.items():
         nested = nested_models(info.annotation)
         kind = "table" if nested else _type_name(info.annotation)
@@ -167,26 +167,29 @@ CHANGES: tuple[Row, ...] = (
 
 
 def scene_tables() -> Mapping[str, tuple[str, Callable[[], list[Row]]]]:
-    """Return name → (what it is, its rows on demand) of all that a scene may hold."""
+    """Return name → (description, function returning its rows) of every table of a scene."""
     known: dict[str, tuple[str, Callable[[], list[Row]]]] = {
         "scene": ("Keys at the top of a scene file.", lambda: list(SCENE)),
         "extends": ("Keys that any table of a scene may have.", lambda: list(ANYWHERE)),
         "blocks": (
             "Keys of [blocks.NAME] that every type has, beside `type` and its own parameters.",
-            lambda: _rows_of(BlockOptions),
+            lambda: _unindented_parameter_rows(BlockOptions),
         ),
         "wires": ("Keys of an item of `wires`.", lambda: list(WIRES)),
-        "outages": ("Keys of an item of `outages`.", lambda: _rows_of(Outage)),
+        "outages": ("Keys of an item of `outages`.", lambda: _unindented_parameter_rows(Outage)),
         "changes": ("Keys of an item of `changes`.", lambda: list(CHANGES)),
-        "processors": ("Keys of [processors.NAME].", lambda: _rows_of(ProcessorParameters)),
+        "processors": (
+            "Keys of [processors.NAME].",
+            lambda: _unindented_parameter_rows(ProcessorParameters),
+        ),
     }
     for name, model in section_models().items():
         doc = (model.__doc__ or "").strip().split("\n\n")[0].replace("\n", " ")
-        known[name] = (f"Keys of [{name}]: {doc}", partial(_rows_of, model))
+        known[name] = (f"Keys of [{name}]: {doc}", partial(_unindented_parameter_rows, model))
     return known
 
 
-def _rows_of(model: type[BaseModel]) -> list[Row]:
+def _unindented_parameter_rows(model: type[BaseModel]) -> list[Row]:
     return [
         (name.strip(), kind, unit, default, meaning)
         for name, kind, unit, default, meaning in parameter_rows(model)

@@ -8,8 +8,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any, TypedDict, Unpack
 
-from dsa_des.block.foreign import Foreign, Imports, imports
-from dsa_des.commands.grouping import check_grouping
+from dsa_des.block.shadowed_packages import Foreign, Imports, import_policy
+from dsa_des.commands.grouping import check_window_independence
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.running.effects import Planned
 from dsa_des.running.pacing import Pacer, parse_factor
@@ -42,7 +42,7 @@ class SceneOptions(TypedDict):
     duration: str | None
 
 
-def load(
+def load_printing_notes(
     scene: str,
     sets: Iterable[str],
     swaps: Iterable[str],
@@ -50,7 +50,7 @@ def load(
     duration: str | None,
     noted: bool = False,
 ) -> Scene:
-    """Load and check a scene; notes on that go to standard error, unless they are printed later."""
+    """Load and check a scene; print notes on standard error unless `noted` defers that."""
     path = find_input_file(scene, "scene")
     data = scene_of_data(path)
     if data is None:
@@ -64,14 +64,14 @@ def load(
     return loaded
 
 
-def check_command(
+def text_of_check_command(
     scene: str,
     sets: Iterable[str],
     swaps: Iterable[str],
     seed: int | None,
     duration: str | None,
 ) -> str:
-    """Return the command that shows the notes on a scene, fit to be pasted into a shell."""
+    """Return the shell line ``dsa-des check ...`` that shows the notes on a scene."""
     words = ["dsa-des", "check", scene]
     for option, values in (("--set", sets), ("--swap", swaps)):
         for value in values:
@@ -92,14 +92,14 @@ def run_scene(
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
-    loaded = load(**options, noted=True)
+    loaded = load_printing_notes(**options, noted=True)
     target = OutputFolder.from_option(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
         target,
         simulate_everything=simulate_everything,
         silent=quiet or as_json,
-        notes_command=None if quiet else check_command(**options),
+        notes_command=None if quiet else text_of_check_command(**options),
         pacer=pacer,
         draw=not no_figures,
     )
@@ -128,7 +128,7 @@ def pause_garbage_collection() -> Iterator[None]:
 
 
 def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
-    """Load a scene, prepare its blocks (files are read), and print what it holds.
+    """Load, check and set up a scene; print its blocks, clocks, changes and outages.
 
     Blocks of others also run a few scans, in two groupings. Every foreign module is named, with its
     file, before it is imported: one that ends the process (``os._exit``) has the last line. With
@@ -141,9 +141,9 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
 
     with (
         pause_garbage_collection(),
-        imports(Imports(allowed=not no_import, announce=announce)) as policy,
+        import_policy(Imports(allowed=not no_import, announce=announce)) as policy,
     ):
-        loaded = load(**options, noted=True)
+        loaded = load_printing_notes(**options, noted=True)
         scene = options["scene"]
         for line in loaded.about:
             say(line)
@@ -155,7 +155,7 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
             )
             return
         simulation = Simulation(loaded)
-        check_grouping(loaded, partial(load, **options, noted=True))
+        check_window_independence(loaded, partial(load_printing_notes, **options, noted=True))
     warn_of_long_run(simulation)
     print_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
@@ -183,9 +183,9 @@ def explain_scene(
     measure: bool, simulate_everything: bool, **options: Unpack[SceneOptions]
 ) -> None:
     """Print a table of every block's effects; with `measure`, run the scene to time them."""
-    loaded = load(**options)
+    loaded = load_printing_notes(**options)
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
-    shares = measured_shares(loaded, simulate_everything) if measure else None
+    shares = measure_effect_time_shares(loaded, simulate_everything) if measure else None
     console = terminal.console(_WIDE)  # no terminal: every sentence on one line
     # What the scene calls for stands first: most of what there is, it does not call for.
     planned, rows = _plan_effects(simulation, 0, shares)
@@ -211,8 +211,8 @@ def explain_scene(
 def _plan_effects(
     simulation: Simulation, stretch: int, shares: Mapping[tuple[str, str], float] | None
 ) -> tuple[list[Planned], list[tuple[str, str, str, str]]]:
-    """Return which effects are built or left out in a stretch of the scene, also as rows of a
-    table.
+    """Return the effects in one stretch of the scene between its changes, built ones first, and the
+    same as table rows with bounds, share of run time and reason.
     """
     planned = [*simulation.plans[stretch], *simulation.timing_plan_of(stretch)]
     planned.sort(key=lambda item: not item.built)
@@ -220,7 +220,7 @@ def _plan_effects(
     for item in planned:
         share = None if shares is None else shares.get((item.block, item.effect.name))
         timed = "" if share is None else f"{share:.1%}"
-        rows.append((shorten(item.block), _bound_text(item), timed, item.sentence()))
+        rows.append((shorten(item.block), _effect_bounds_text(item), timed, item.sentence()))
     for name, component in simulation.stretches[stretch].items():
         rows += [(shorten(name), "", "", sentence) for sentence in component.skipped_work_notes()]
     return planned, rows
@@ -247,7 +247,7 @@ def _table_of_unproven(items: list[Planned]) -> Any:
     return table
 
 
-def _bound_text(item: Planned) -> str:
+def _effect_bounds_text(item: Planned) -> str:
     return ", ".join(f"{q} {bound:.2g}" for q, bound in sorted(item.verdict.bound.items()))
 
 
@@ -273,10 +273,10 @@ class _Timed:
             self.spent_s += time.perf_counter() - started
 
 
-def measured_shares(
+def measure_effect_time_shares(
     scene: Scene, simulate_everything: bool = False
 ) -> dict[tuple[str, str], float]:
-    """Run a scene and return each built effect's share of the run time, by (block, effect).
+    """Run a scene; return each built effect's share of run time (0 to 1), by (block, effect).
 
     An effect that is a choice rather than a calculation, such as the name of a method, has none.
     """

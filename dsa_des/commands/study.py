@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from dsa_des.errors import BlockFailure, Problem, SceneError, UsageError, did_you_mean
-from dsa_des.files.output_file import check_file, write_file
-from dsa_des.files.output_names import check_folder_path, claim_folder, user_path
+from dsa_des.files.output_file import check_file_writable, write_file
+from dsa_des.files.output_names import check_folder_path, make_numbered_folder, user_path
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import STUDY_JSON, StudyFolder, latest_folder
 from dsa_des.results.printing import print_study_tables
@@ -19,7 +19,6 @@ from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, T
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import parse_assignment
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import (
     Clock,
     Progress,
@@ -29,7 +28,8 @@ from dsa_des.studies.runner import (
     study_lock_step_refusal,
     tables_of,
 )
-from dsa_des.studies.study import Study, command_of
+from dsa_des.studies.study import Study, portable_command_line
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say, say_json
@@ -57,7 +57,7 @@ def study_command(
     as_json: bool,
     quiet: bool,
 ) -> None:
-    """Do what the command line asks for; exit code 1 if runs crashed, 130 on ctrl-C."""
+    """Run a study as the command line says; exit with code 1 if runs crashed and 130 on ctrl-C."""
     if metrics:
         _list_metrics()
         return
@@ -66,13 +66,15 @@ def study_command(
     name, path = study, find_input_file(study, "study")
     sets = (*sets, *options_as_sets(swaps, seed, replicas))
     described = read_study(path, sets=sets)
-    described.repeat = command_of(["study"], sets, described.path)
+    described.repeat = portable_command_line(["study"], sets, described.path)
 
     def resume_command(folder: Path) -> str:
         return _resume_command(name, folder, sets, workers, executor, scheduler, measure)
 
-    target = output_folder_of(_HOME, described.path.stem, out, resume)
-    folder = run_into(described, target, workers, resume, resume_command, executor, scheduler)
+    target = choose_output_folder(_HOME, described.path.stem, out, resume)
+    folder = run_study_into_folder(
+        described, target, workers, resume, resume_command, executor, scheduler
+    )
     try:
         tables = report_finished_study(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
@@ -80,12 +82,12 @@ def study_command(
         if measure:
             _measure_model_errors(folder, silent=quiet)
     except KeyboardInterrupt:
-        stop_with("interrupted", resume_command(folder.path), 130)
-    report_crashes([tables], resume_command(folder.path))
+        exit_with_resume_hint("interrupted", resume_command(folder.path), 130)
+    exit_if_runs_crashed([tables], resume_command(folder.path))
 
 
 def options_as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None) -> list[str]:
-    """Return options as changes of a study file, as --set has them."""
+    """Return the options as ``--set`` texts: ``swap.BLOCK=TYPE``, ``seed=N``, ``replicas=N``."""
     sets = []
     for swap in swaps:
         parsed = parse_assignment(swap, "--swap")
@@ -114,10 +116,12 @@ def require_empty_or_resumed(
             raise UsageError(f"--out {location}: is not empty; --resume continues {what}")
 
 
-def output_folder_of(
+def choose_output_folder(
     home: Path, stem: str, out: str | None, resume: bool
 ) -> "Path | Callable[[], Path]":
-    """Return the folder that --out names, or the latest to go on with, or what makes a new one."""
+    """Return the folder that ``--out`` names, with `resume` the latest ``stem-NNN`` in `home`, or
+    else a function that makes a new one.
+    """
     if out is not None:
         return user_path(out)
     if resume:
@@ -125,7 +129,7 @@ def output_folder_of(
         if earlier is None:
             raise UsageError(f"--resume: there is no {home / stem}-NNN to continue")
         return earlier
-    return lambda: claim_folder(home, stem)
+    return lambda: make_numbered_folder(home, stem)
 
 
 def _resume_command(
@@ -152,15 +156,15 @@ def _resume_command(
     return shell_line([*words, *(["--"] if study.startswith("-") else []), study])
 
 
-def stop_with(reason: str, again: str, code: int) -> NoReturn:
-    """Say why a study stopped and how it is continued, and end."""
+def exit_with_resume_hint(reason: str, again: str, code: int) -> NoReturn:
+    """Print why a study stopped and the command that continues it, and exit with `code`."""
     say(f"stopped: {reason}; what is finished is kept, continue with", err=True)
     say(f"  {again}", err=True)
     sys.exit(code)
 
 
-def report_crashes(result: Sequence[Tables], again: str) -> None:
-    """Say how many runs crashed, and end with exit code 1 if there are any."""
+def exit_if_runs_crashed(result: Sequence[Tables], again: str) -> None:
+    """If runs crashed, print how many and the command to retry; exit with code 1."""
     crashed = sum(tables.rows.crashed for tables in result)
     if crashed:
         runs = sum(_count_crashed_runs(tables) for tables in result)
@@ -174,14 +178,14 @@ def report_crashes(result: Sequence[Tables], again: str) -> None:
 
 
 def check_workers(workers: int | None) -> None:
-    """Raise UsageError unless so many processes can be had."""
+    """Raise UsageError unless the worker number is None, or at least 1 and not too large."""
     if workers is not None and workers < 1:
         raise UsageError(f"--workers is {workers}: it must be 1 or more")
     if workers is not None and workers > _MOST_WORKERS:
         raise UsageError(f"--workers is {workers}: at most {_MOST_WORKERS} are allowed")
 
 
-def run_into(
+def run_study_into_folder(
     study: Study,
     path: "Path | Callable[[], Path]",
     workers: int | None,
@@ -190,7 +194,7 @@ def run_into(
     kind: str = "local",
     scheduler: str | None = None,
 ) -> StudyFolder:
-    """Run a study into a folder; exit code 1 or 130 when it is stopped and can be resumed.
+    """Run a study into a folder and return it; exit with 1 or 130 if stopped and resumable.
 
     UsageError where no run gave a result. `path` is the folder, or what makes a new one; `again` is
     the command that continues there.
@@ -200,18 +204,20 @@ def run_into(
     folder: StudyFolder | None = None
     try:
         folder = StudyFolder(path if isinstance(path, Path) else path())
-        folder.open(description_text(study), resume=resume)
+        folder.open(study_json_text(study), resume=resume)
         with _show_progress(study) as report:
             _refuse_all_failed(study, folder, run_study(study, folder, executor, report))
     except Stopped as stop:
         assert folder is not None
         code = 130 if str(stop) == "interrupted" else 1
-        stop_with(str(stop), again if isinstance(again, str) else again(folder.path), code)
+        exit_with_resume_hint(
+            str(stop), again if isinstance(again, str) else again(folder.path), code
+        )
     except KeyboardInterrupt:
         if folder is None or not (folder.path / STUDY_JSON).exists():
             sys.exit(130)
         command = again if isinstance(again, str) else again(folder.path)
-        stop_with("interrupted", command, 130)
+        exit_with_resume_hint("interrupted", command, 130)
     finally:
         executor.close()
         if folder is not None:
@@ -220,7 +226,7 @@ def run_into(
 
 
 def _refuse_all_failed(study: Study, folder: StudyFolder, progress: Progress) -> None:
-    """Raise UsageError where every run of a study failed: it answers nothing."""
+    """Raise UsageError with the first run's error if every run of a study failed."""
     if 0 < progress.failed == progress.runs and not progress.crashed:
         why = shorten(str(StoredRows(folder).failed[0]["error"]), _LONGEST_ERROR)
         raise UsageError(
@@ -234,7 +240,7 @@ def report_finished_study(
     only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
     draw: bool = True, as_json: bool = False,
 ) -> Tables:  # fmt: skip
-    """Write the tables of a finished study, draw its figures and print them.
+    """Write the tables of a finished study, draw its figures, print the tables, and return them.
 
     `only` names the results to print; by default those that the study draws. `first` prints what
     stands before the tables; without `draw` there are no figures; `as_json` prints the tables as
@@ -294,7 +300,7 @@ def show_study(
     The folder's tables are read and nothing else: no scene, and no code that it names.
     """
     folder = StudyFolder(path)
-    every = result_names(folder.record.results, only)
+    every = summarised_result_names(folder.record.results, only)
     report_finished_study(
         folder.record, folder, only=only or every, first=first, draw=draw, as_json=as_json
     )
@@ -303,10 +309,10 @@ def show_study(
 def _measure_model_errors(folder: StudyFolder, silent: bool = False) -> None:
     """Measure the errors of the models of a study's first run, and keep them in its folder."""
     from dsa_des.commands.cost import CostProgress
-    from dsa_des.costs.models import measure_errors
+    from dsa_des.costs.models import measure_and_store_errors
 
     try:
-        measure_errors(folder, CostProgress(silent=silent).say)
+        measure_and_store_errors(folder, CostProgress(silent=silent).print_if_due)
     except (SceneError, BlockFailure) as error:
         say(f"errors of the models were not measured: {error}", err=True)
     except OSError as error:
@@ -314,14 +320,14 @@ def _measure_model_errors(folder: StudyFolder, silent: bool = False) -> None:
 
 
 def report_command(folder: str, out: str | None, no_figures: bool, measure: bool) -> None:
-    """Write one HTML page about a study's folder, into it or where `--out` says."""
+    """Write one HTML page about a study's folder, into that folder or to the path `out`."""
     from dsa_des.results.report import REPORT, study_report
 
     path = Path(folder)
     study = StudyFolder(path)
     target = path / REPORT if out is None else user_path(out)
     if out is not None:
-        check_file(target)
+        check_file_writable(target)
     if measure:
         _measure_model_errors(study)
     try:
@@ -333,10 +339,10 @@ def report_command(folder: str, out: str | None, no_figures: bool, measure: bool
     say(f"wrote {target}")
 
 
-def result_names(
+def summarised_result_names(
     results: Sequence[Result], only: Sequence[str], option: str = "--metric"
 ) -> list[str]:
-    """Return the names of results; UsageError where an option names none."""
+    """Return the names of all summarised results; UsageError if `only` has another name."""
     every = [result.name for result in results if result.is_summarised]
     for name in only:
         if name not in every:
@@ -346,7 +352,7 @@ def result_names(
 
 @contextmanager
 def _show_progress(study: Study) -> Iterator[Any]:
-    """Show a progress bar on a terminal, and a line now and then elsewhere."""
+    """Yield a function that shows progress: a bar on a terminal, else a line every 10 s at most."""
     clock = Clock()
     if sys.stderr.isatty():
         with terminal.progress("text") as bar:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.results.differences import subtract_without_rounding
+from dsa_des.results.differences import second_minus_first_without_rounding
 from dsa_des.results.labels import short_text, unit_of
 from dsa_des.results.record import EVENT, Result
 from dsa_des.results.tables import Tables
@@ -30,8 +30,8 @@ class ConditionPair:
         self.rows = [np.array([side[key] for key in self.keys], dtype=np.int64)
                      for side in (first, second)]  # fmt: skip
 
-    def values(self, metric: str) -> tuple[FloatArray, FloatArray]:
-        """Return a result of both; NaN where a run has none."""
+    def paired_values(self, metric: str) -> tuple[FloatArray, FloatArray]:
+        """Return a result in both conditions, by run, as two arrays; NaN where a run has none."""
         first, second = (
             tables.rows.column(metric)[rows].astype(float)
             for tables, rows in zip(self.tables, self.rows, strict=True)
@@ -49,7 +49,7 @@ def _row_by_key(tables: Tables, rows: IntArray) -> dict[tuple[Any, ...], int]:
 
 @dataclass(frozen=True)
 class _Change:
-    """How a result changed over pairs of runs: in how many it fell, rose, went and came."""
+    """How a result changed over pairs: how many fell, rose, were lost or gained, and the mean."""
 
     result: Result
     pairs: int
@@ -65,7 +65,7 @@ class _Change:
         return bool(self.fell or self.rose or self.gone or self.come)
 
     def clauses(self) -> list[str]:
-        """Return its clauses in the result's own words."""
+        """Return phrases on how many runs fell and rose, in the result's words, and mean change."""
         of, told = f" of {self.pairs} runs", self.result.told
         assert told is not None
         parts = [
@@ -74,12 +74,12 @@ class _Change:
             if many
         ]
         if parts and self.result.kind != EVENT:
-            parts[-1] += f" (mean {self.amount})"
+            parts[-1] += f" (mean {self.mean_change_text})"
         return parts
 
     @property
-    def amount(self) -> str:
-        """The mean change with its sign and unit."""
+    def mean_change_text(self) -> str:
+        """The mean change as text with its sign and unit; empty if it is unknown."""
         if self.mean != self.mean:
             return ""
         unit = unit_of(self.result.name)
@@ -91,7 +91,7 @@ class _Change:
 def print_changes(
     names: tuple[str, str], places: Sequence[tuple[str, ConditionPair]], results: Iterable[Result]
 ) -> None:
-    """Say what changed from one condition to another.
+    """Print what changed in the results from one condition to another.
 
     `places` are what is compared: where, and the runs of both conditions there. Both have
     `results`.
@@ -130,7 +130,7 @@ def _change_lines(changes: Sequence[_Change]) -> list[str]:
     others = [change for change in changes if change.result.told is None]
     changed = [change for change in others if change.has_change]
     if changed:
-        shown = [_brief_change(change) for change in changed[:_MOST_NAMED]]
+        shown = [_brief_change_text(change) for change in changed[:_MOST_NAMED]]
         more = len(changed) - _MOST_NAMED
         lines.append(
             ("also changed: " if clauses else "changed: ")
@@ -142,17 +142,17 @@ def _change_lines(changes: Sequence[_Change]) -> list[str]:
     return lines
 
 
-def _brief_change(change: _Change) -> str:
+def _brief_change_text(change: _Change) -> str:
     name = shorten(change.result.name)
-    if change.amount:
-        return f"{name} ({change.amount} on average)"
+    if change.mean_change_text:
+        return f"{name} ({change.mean_change_text} on average)"
     return f"{name} (only one of the two has it in {change.gone + change.come})"
 
 
 def _count_change(result: Result, pair: ConditionPair) -> _Change:
-    before, after = pair.values(result.name)
+    before, after = pair.paired_values(result.name)
     known = ~np.isnan(before) & ~np.isnan(after)
-    changes = subtract_without_rounding(before[known], after[known])
+    changes = second_minus_first_without_rounding(before[known], after[known])
     mean = float(changes.mean()) if known.any() else float("nan")
     fell, rose = changes < 0.0, changes > 0.0
     gone, come = ~np.isnan(before) & np.isnan(after), np.isnan(before) & ~np.isnan(after)
@@ -161,7 +161,7 @@ def _count_change(result: Result, pair: ConditionPair) -> _Change:
 
 
 def print_changes_along_axis(tables: Tables, only: Sequence[str] = ()) -> None:
-    """Say what changes along the axis that a study compares, from its baseline to each value."""
+    """Print how results change from the compared axis's baseline to each of its other values."""
     if tables.baseline is None:
         return
     axis, baseline = tables.baseline

@@ -16,7 +16,7 @@ from dsa_des.block.mark import RED
 from dsa_des.costs.climb import Comparison, RungCost, is_on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.drawing import draw_to_png, figure_text, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, set_plain_log_ticks
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -28,10 +28,11 @@ _REPEATS = 7
 Group = list[RungCost]
 
 
-def run_chain(
+def run_rung_combinations(
     variants: Variants, costs: Sequence[RungCost], comparison: Comparison
 ) -> tuple[list[dict[str, Any]], str]:
-    """Return rows of combinations of rungs, compared with the references, and how they were picked.
+    """Run combinations of the blocks' rungs and return a row for each (CPU cost, error against the
+    references, on the front or not), and a sentence on how they were chosen.
 
     The error is the comparison's `Difference`. Every combination is run seven times,
     interleaved, without recording; its cost is the shortest of them.
@@ -46,22 +47,22 @@ def run_chain(
     whole = _count_combinations(chosen)
     while _count_combinations(chosen) > MOST:
         widest = max(chosen, key=len)
-        widest.remove(_choose_expendable(widest))
+        widest.remove(_choose_rung_to_drop(widest))
     combinations = list(itertools.product(*chosen))
     best = [next(c for c in group if c.rung == c.reference) for group in groups]
     reference_scene = variants.with_rungs(_choices_of_rungs(best))
-    reference = _run_recorded(reference_scene)
+    reference = _recorded_tables_of_run(reference_scene)
     rows: list[dict[str, Any]] = []
     scenes: list[Scene] = []
     for combination in combinations:
         try:
             scene = variants.with_rungs(_choices_of_rungs(combination))
-            effect = comparison(reference, _run_recorded(scene))
+            effect = comparison(reference, _recorded_tables_of_run(scene))
         except (Unavailable, SceneError, BlockFailure):
             continue
         scenes.append(scene)
         rows.append(_chain_row(combination, comparison, effect))
-    times = _time_runs(scenes)
+    times = _shortest_cpu_times_s(scenes)
     for row, cpu_s, scene in zip(rows, times, scenes, strict=True):
         row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_count_target_scans(scene), 1)
     points = [(row["cpu_us_per_target_scan"], row["error_p95"]) for row in rows]
@@ -83,8 +84,10 @@ def _count_combinations(groups: Sequence[Sequence[RungCost]]) -> int:
     return count
 
 
-def _choose_expendable(group: Group) -> RungCost:
-    """Return the rung between the cheapest and the reference that is nearest in cost to another."""
+def _choose_rung_to_drop(group: Group) -> RungCost:
+    """Return the rung whose cost is closest to that of another one in the group, leaving out the
+    reference and preferably also the scene's own.
+    """
     inner = [c for c in group if c.rung != c.reference and not c.in_scene]
     inner = inner or [c for c in group if c.rung != c.reference]
     ordered = sorted(group, key=lambda c: c.cpu_us_per_target_scan)
@@ -102,13 +105,13 @@ def _choices_of_rungs(combination: Sequence[RungCost]) -> list[Choice]:
     return [Choice(c.block, c.ladder, c.ladder.rung(c.rung)) for c in combination]
 
 
-def _run_recorded(scene: Scene) -> dict[str, Any]:
+def _recorded_tables_of_run(scene: Scene) -> dict[str, Any]:
     sink = MemorySink()
     Simulation(scene, recorder=Recorder([sink])).run()
     return sink.tables()
 
 
-def _time_runs(scenes: Sequence[Scene]) -> list[float]:
+def _shortest_cpu_times_s(scenes: Sequence[Scene]) -> list[float]:
     best = [float("inf")] * len(scenes)
     for _ in range(_REPEATS):
         for index, scene in enumerate(scenes):
@@ -120,7 +123,7 @@ def _time_runs(scenes: Sequence[Scene]) -> list[float]:
 
 
 def _count_target_scans(scene: Scene) -> int:
-    """Return scans of all clocks times targets."""
+    """Return the scans of all clocks in a run, times the largest target number of any block."""
     simulation = Simulation(scene)
     width = max(component.width for component in simulation.components.values())
     scans = 0
@@ -173,8 +176,8 @@ def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: st
         figure.text(0.02, 0.1 / height_in, key, fontsize=6.5, va="bottom")
         axes.set_xscale("log")
         axes.set_yscale("log")
-        plain_log_ticks(axes.xaxis)
-        plain_log_ticks(axes.yaxis)
+        set_plain_log_ticks(axes.xaxis)
+        set_plain_log_ticks(axes.yaxis)
         if min(errors, default=1.0) <= 0.0:
             low, high = axes.get_ylim()
             ticks = [t for t in axes.get_yticks() if 1.5 * floor < t <= high]

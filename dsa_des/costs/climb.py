@@ -27,7 +27,7 @@ _BUDGET = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S+)\s*")
 
 
 def is_on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
-    """Return which (cost, error) no other point beats: none is as good on both and better on one.
+    """Return which (cost, error) points are on the Pareto front: no other dominates them.
 
     A NaN error is on no front.
     """
@@ -65,7 +65,7 @@ def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, 
 def allowed_error(
     quantity: Quantity, budgets: Mapping[str, float], tolerance: Mapping[str, float]
 ) -> float | None:
-    """Return the largest error that `--budget`, or else ``[accuracy]``, allows; None for any."""
+    """Return the largest allowed error, by the unit's budget, else ``[accuracy]``, else None."""
     if quantity.unit in budgets:
         return budgets[quantity.unit]
     if quantity.tolerance in tolerance:
@@ -100,7 +100,7 @@ class Comparison:
         return changes
 
     def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
-        """Return remarks on changes that no column shows."""
+        """Return the remarks of all reports on changes that no column of the table shows."""
         return [
             remark
             for report in self._reports
@@ -109,8 +109,8 @@ class Comparison:
         ]
 
 
-def show_number(change: Change, changes: Mapping[str, Any], none: str) -> str:
-    """Return one number as its table shows it, or `none` where it is unknown."""
+def format_change_value(change: Change, changes: Mapping[str, Any], none: str) -> str:
+    """Return one change's value as text in the change's own format; `none` if unknown."""
     value = changes.get(change.key)
     return none if value is None else format(value, change.form)
 
@@ -123,7 +123,7 @@ _APART = 1.1
 
 @dataclass
 class RungCost:
-    """What one rung costs and what it gets wrong."""
+    """The CPU cost and the errors of one rung of a ladder."""
 
     block: str
     ladder: Ladder
@@ -152,8 +152,8 @@ class RungCost:
     cheapest_inside: bool = False
 
     @property
-    def error(self) -> Spread:
-        """Error in the ladder's first quantity; NaN where unknown."""
+    def first_quantity_error(self) -> Spread:
+        """The errors in the ladder's first quantity; NaN where they are unknown."""
         unknown = Spread(math.nan, math.nan, math.nan, 0)
         return self.errors.get(self.ladder.quantities[0].name, unknown)
 
@@ -173,9 +173,9 @@ class RungCost:
             "repeats": self.repeats,
             "error_quantity": first.name,
             "error_unit": first.unit,
-            "error_mean": _finite_or_none(self.error.mean),
-            "error_p95": _finite_or_none(self.error.p95),
-            "error_max": _finite_or_none(self.error.maximum),
+            "error_mean": _finite_or_none(self.first_quantity_error.mean),
+            "error_p95": _finite_or_none(self.first_quantity_error.p95),
+            "error_max": _finite_or_none(self.first_quantity_error.maximum),
             "error_is": "own" if self.rung == self.reference else "added",
             "error_note": self.error_note or None,
             "pareto": self.pareto,
@@ -202,13 +202,13 @@ def _finite_or_none(value: float) -> float | None:
 
 
 def inapplicable_reason(variants: Variants, block: str, ladder: Ladder) -> str:
-    """Return why a ladder changes nothing in this scene; empty when it may."""
+    """Return why a ladder's rungs make no difference in this scene; empty if they may."""
     if ladder.applies is None:
         return ""
     return ladder.applies(Simulation(variants.scene).components[block])
 
 
-def climb(
+def measure_rungs(
     variants: Variants,
     block: str,
     ladder: Ladder,
@@ -219,7 +219,7 @@ def climb(
     compare: Compare | None = None,
     own: RungRun | None = None,
 ) -> list[RungCost]:
-    """Run the scene with every rung of a block's ladder and return their costs, crude to exact.
+    """Run the scene with each rung of a ladder; return costs and errors, crude to exact.
 
     `budgets` are largest allowed errors by unit, else the scene's ``[accuracy]``; `against` is
     another reference than the ladder's own; `compare` returns the changes of the run's results.
@@ -253,7 +253,7 @@ def climb(
             continue
         run = runs[rung.name]
         cost.in_scene = _is_same_block(run, variants, block)
-        scale = 1e6 / max(run.target_scans() * targets, 1)
+        scale = 1e6 / max(run.instant_count() * targets, 1)
         median, spread = median_and_spread(run.repeats_s)
         cost.cpu_us_per_target_scan, cost.cpu_spread_us = median * scale, spread * scale
         cost.repeats = len(run.repeats_s)
@@ -265,7 +265,7 @@ def climb(
             cost.errors = errors_against(ladder, replay_values(ladder, run, baseline), known[key])
             if compare is not None:
                 cost.effect = compare(baseline.tables, run.tables)
-    _mark_budgets(costs, budgets or {}, variants.tolerance)
+    _mark_front_and_budgets(costs, budgets or {}, variants.tolerance)
     return costs
 
 
@@ -276,7 +276,7 @@ def _run_variant(
     shared: list[Choice] | None = None,
     own: RungRun | None = None,
 ) -> RungRun:
-    """Run a variant, unless it is the scene itself whose run is there.
+    """Run the scene with other rungs and return that run; `own` if the scene is the same.
 
     Whatever keeps it from running makes the rung unavailable.
     """
@@ -307,7 +307,7 @@ def _is_same_block(run: RungRun, variants: Variants, block: str) -> bool:
 
 
 def _equalise_ties(costs: list[RungCost]) -> None:
-    """Give costs that count as equal one value."""
+    """Set the CPU costs of rungs within 10 % of each other to their mean; note which are tied."""
     ordered = sorted(costs, key=lambda cost: cost.cpu_us_per_target_scan)
     groups: list[list[RungCost]] = []
     for cost in ordered:
@@ -322,14 +322,17 @@ def _equalise_ties(costs: list[RungCost]) -> None:
             cost.tied_with = [other.rung for other in group if other is not cost]
 
 
-def _mark_budgets(
+def _mark_front_and_budgets(
     costs: list[RungCost], budgets: Mapping[str, float], tolerance: Mapping[str, float]
 ) -> None:
     known = [cost for cost in costs if not cost.unavailable]
     _equalise_ties(known)
     # A reference whose own error is unknown is on the front: nothing is known to beat it.
     points = [
-        (c.cpu_us_per_target_scan, 0.0 if c.rung == c.reference and not c.errors else c.error.p95)
+        (
+            c.cpu_us_per_target_scan,
+            0.0 if c.rung == c.reference and not c.errors else c.first_quantity_error.p95,
+        )
         for c in known
     ]
     for cost, front in zip(known, is_on_front(points), strict=True):

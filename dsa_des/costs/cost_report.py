@@ -9,9 +9,9 @@ from textwrap import wrap
 from typing import Any
 
 from dsa_des.block.mark import RED
-from dsa_des.costs.climb import Comparison, RungCost, show_number
+from dsa_des.costs.climb import Comparison, RungCost, format_change_value
 from dsa_des.files.output_file import write_file
-from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, set_plain_log_ticks
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
 from dsa_des.text.safe_text import shorten
@@ -73,8 +73,12 @@ def _cost_cells(cost: RungCost, comparison: Comparison) -> list[str]:
     if cost.unavailable:
         missing = f"not available: {cost.unavailable}"
         return [name, *[_NO_ERROR] * (4 + len(comparison.changes)), missing]
-    errors = [cost.error.mean, cost.error.p95, cost.error.maximum]
-    effects = [show_number(change, cost.effect, _NO_ERROR) for change in comparison.changes]
+    errors = [
+        cost.first_quantity_error.mean,
+        cost.first_quantity_error.p95,
+        cost.first_quantity_error.maximum,
+    ]
+    effects = [format_change_value(change, cost.effect, _NO_ERROR) for change in comparison.changes]
     return [
         name,
         f"{_round_plainly(cost.cpu_us_per_target_scan)} ± {_round_plainly(cost.cpu_spread_us, 1)}",
@@ -103,7 +107,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
         [
             _round_plainly(row["cpu_us_per_target_scan"]),
             f"{row['error_p95']:.2%}",
-            *(show_number(change, row["effect"], _NO_ERROR) for change in telling),
+            *(format_change_value(change, row["effect"], _NO_ERROR) for change in telling),
             row["rung"],
         ]
         for row in sorted(chain, key=lambda row: float(row["cpu_us_per_target_scan"]))
@@ -127,7 +131,7 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
         for _, group in groupby(costs, key=lambda c: (c.block, c.ladder.name))
     ]
     # A block that saw no target says nothing of its rungs.
-    panels = [rungs for rungs in panels if any(cost.error.count for cost in rungs)]
+    panels = [rungs for rungs in panels if any(cost.first_quantity_error.count for cost in rungs)]
     columns = min(3, max(1, len(panels)))
     rows = max(1, math.ceil(len(panels) / columns))
     with draw_to_png(4.3 * columns, 3.5 * rows + 0.5, path) as figure:
@@ -152,7 +156,7 @@ Label = tuple[str, tuple[float, float], float, str]
 def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     """Draw a ladder's points and front, and return their labels."""
     first, quantity = rungs[0], rungs[0].ladder.quantities[0]
-    others = [cost.error.p95 for cost in rungs if cost.rung != first.reference]
+    others = [cost.first_quantity_error.p95 for cost in rungs if cost.rung != first.reference]
     known = [error for error in others if error > 0.0]
     # Errors of rounding, of 0 and unknown ones stand on the floor, open, with their number: on a
     # true scale they would press all others together, and a log axis has no zero.
@@ -160,7 +164,10 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     points: list[tuple[tuple[float, float], bool]] = []
     labels: list[Label] = []
     for cost in sorted(rungs, key=lambda c: c.cpu_us_per_target_scan):
-        error, label = cost.error.p95, cost.rung + (" (scene)" if cost.in_scene else "")
+        error, label = (
+            cost.first_quantity_error.p95,
+            cost.rung + (" (scene)" if cost.in_scene else ""),
+        )
         on_floor = not error > floor
         if on_floor:
             label += (
@@ -189,8 +196,8 @@ def _draw_panel(axes: Any, rungs: Sequence[RungCost]) -> list[Label]:
     axes.set_xlabel("CPU time of the block (µs per target-scan)", fontsize=8)
     what = quantity.name.replace("_", " ")
     axes.set_ylabel(f"{what}: 95 % of errors\nbelow ({quantity.unit})", fontsize=8)
-    plain_log_ticks(axes.xaxis)
-    plain_log_ticks(axes.yaxis)
+    set_plain_log_ticks(axes.xaxis)
+    set_plain_log_ticks(axes.yaxis)
     axes.tick_params(which="both", labelsize=7)
     return labels
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from dsa_des.block.ladder import Ladder, Unavailable
-from dsa_des.costs.climb import RungCost, climb, inapplicable_reason
-from dsa_des.costs.replay import run_watched
+from dsa_des.costs.climb import RungCost, inapplicable_reason, measure_rungs
+from dsa_des.costs.replay import run_with_recorded_wakes
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.models import (
@@ -25,14 +25,14 @@ from dsa_des.scene.scene import Scene
 
 
 def scene_record(where: str, scene: Scene) -> SceneRecord:
-    """Return which models and effects a scene has, and what they leave out."""
+    """Return a record of a scene's models, effects (on or off, and why), and skipped work."""
     simulation = Simulation(scene)
     models, spared = [], []
     for name, component in simulation.components.items():
         block = scene.blocks[name]
         about = (type(component).__doc__ or "").strip().partition("\n")[0]
         rungs = [
-            _rung_of_block(scene, name, ladder)
+            _rung_text_of_block(scene, name, ladder)
             for ladder in block.cls.ladders_for(block.parameters)
         ]
         models.append(
@@ -51,14 +51,14 @@ def scene_record(where: str, scene: Scene) -> SceneRecord:
     return SceneRecord(where=where, models=models, effects=effects, spared=spared)
 
 
-def _rung_of_block(scene: Scene, name: str, ladder: Ladder) -> str:
-    """Return which rung of a ladder a block is, as far as its type and keys tell."""
+def _rung_text_of_block(scene: Scene, name: str, ladder: Ladder) -> str:
+    """Return text on which rung a block uses, by type and parameters; empty if none fits."""
     block = scene.blocks[name]
     table = scene.resolved()["blocks"][name]
     best = ""
     for rung in ladder.rungs:
         try:
-            changes = rung.changes(table)
+            changes = rung.parameters_to_set(table)
         except Unavailable:
             continue
         same = rung.type_name in ("", block.type_name) and all(
@@ -74,28 +74,30 @@ def _rung_of_block(scene: Scene, name: str, ladder: Ladder) -> str:
     return best
 
 
-def measure_errors(folder: StudyFolder, report: Callable[[str], None] = lambda text: None) -> None:
-    """Run the first run's scene with its models and their references, and keep the errors.
+def measure_and_store_errors(
+    folder: StudyFolder, report: Callable[[str], None] = lambda text: None
+) -> None:
+    """Run a study's first scene with own models and references; write errors to its folder.
 
     `report` is told which ladder is begun. It reads the scene that the folder names, and imports
     its blocks: not for folders of strangers.
     """
     record = folder.record
     first = StoredRows(folder).first
-    swaps, sets = record.changes(first)
+    swaps, sets = record.swaps_and_sets(first)
     variants = Variants(
         Path(record.scene), sets=[f"{key}={value}" for key, value in sets],
         swaps=[f"{block}={name}" for block, name in swaps], seed=int(first["seed"]),
     )  # fmt: skip
-    rows, notes = scene_errors(variants, report)
+    rows, notes = model_errors_in_scene(variants, report)
     errors = MeasuredErrors(command=record.command(first), rows=rows, notes=notes)
     folder.write_file(ERRORS, (json.dumps(errors.model_dump(), indent=1) + "\n").encode())
 
 
-def scene_errors(
+def model_errors_in_scene(
     variants: Variants, report: Callable[[str], None]
 ) -> tuple[list[ErrorRecord], list[str]]:
-    """Run a scene with its own models and with each one's reference, and return their errors.
+    """Run a scene with own models and with each reference; return own errors, and notes.
 
     Beside them notes: of which ladders nothing could be measured, and why.
     """
@@ -106,7 +108,7 @@ def scene_errors(
     many = sum(map(len, ladders.values()))
     if many:
         report(f"errors of models: the first run ({many} ladders follow)")
-    own = run_watched(variants.scene, [name for name, mine in ladders.items() if mine])
+    own = run_with_recorded_wakes(variants.scene, [name for name, mine in ladders.items() if mine])
     for name, mine in ladders.items():
         for ladder in mine:
             report(f"errors of models: {name}, {ladder.name}")
@@ -114,14 +116,14 @@ def scene_errors(
             if why:
                 notes.append(f"{name}, {ladder.name}: changes nothing here, {why}")
                 continue
-            rung = _rung_in_scene(variants, name, ladder)
+            rung = _rung_name_in_scene(variants, name, ladder)
             if rung is None:
                 notes.append(f"{name}, {ladder.name}: the scene uses none of its rungs")
                 continue
             wanted = {rung, ladder.reference}
             short = replace(ladder, rungs=tuple(r for r in ladder.rungs if r.name in wanted))
             try:
-                costs = climb(variants, name, short, repeats=0, own=own[name])
+                costs = measure_rungs(variants, name, short, repeats=0, own=own[name])
             except Unavailable as error:
                 notes.append(f"{name}, {ladder.name}: no reference in this scene: {error}")
                 continue
@@ -134,8 +136,8 @@ def scene_errors(
     return rows, notes
 
 
-def _rung_in_scene(variants: Variants, name: str, ladder: Ladder) -> str | None:
-    """Return the name of the rung that the scene's block is."""
+def _rung_name_in_scene(variants: Variants, name: str, ladder: Ladder) -> str | None:
+    """Return the name of the rung that the scene's block uses; None if it uses none."""
     own = variants.scene.blocks[name]
     for rung in ladder.rungs:
         try:

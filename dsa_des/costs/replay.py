@@ -33,7 +33,7 @@ _PASSES = 10
 
 @dataclass
 class RungRun:
-    """A run of the scene with one rung."""
+    """A run of the scene with one rung: recorded tables, the block's wakes, processor time."""
 
     scene: Scene
     block: str
@@ -48,18 +48,18 @@ class RungRun:
     passes_s: list[float] = field(default_factory=list)
     _pristine: Component | None = None
 
-    def fresh(self) -> Component:
-        """Return the block set up anew, as before its first wake."""
+    def fresh_block(self) -> Component:
+        """Return a newly set-up instance of the block, as before its first wake."""
         return Simulation(self.scene).components[self.block]
 
-    def pass_s(self) -> float:
-        """Run a fresh block over all wakes and return the processor time."""
+    def time_one_pass_s(self) -> float:
+        """Run a fresh block over all its recorded wakes and return the processor time, s."""
         if self._pristine is None:
-            self._pristine = self.fresh()
+            self._pristine = self.fresh_block()
         try:  # a copy is made ten times faster than a scene is set up
             run = copy.deepcopy(self._pristine).run
         except Exception:  # a foreign block may hold what cannot be copied
-            run = self.fresh().run
+            run = self.fresh_block().run
         wakes = self.wakes
         collecting = gc.isenabled()
         gc.disable()
@@ -72,20 +72,20 @@ class RungRun:
             if collecting:
                 gc.enable()
 
-    def passes(self, wanted: int) -> int:
-        """Return how many passes are run when `wanted` are asked for: fewer of a slow block."""
+    def affordable_passes(self, wanted: int) -> int:
+        """Return how many passes to run: `wanted`, or fewer for a slow block."""
         affordable = int(_LONGEST_S / max(self.block_cpu_s, 1e-9))
         return min(wanted, max(_FEWEST, affordable))
 
-    def timing_s(self, repeats: int) -> float:
-        """Return how long timing a rung that costs as much as this one will take."""
+    def expected_timing_s(self, repeats: int) -> float:
+        """Return how long timing such a rung will take, s; 0 for a very slow block."""
         if self.block_cpu_s > _LONGEST_S:
             return 0.0
-        return self.block_cpu_s * self.passes(repeats * _PASSES)
+        return self.block_cpu_s * self.affordable_passes(repeats * _PASSES)
 
     @property
     def repeats_s(self) -> list[float]:
-        """Processor time of each repeat: the best of its passes; of a slow block, each pass."""
+        """Processor time of each repeat, s: its shortest pass, or, if slow, every pass."""
         if len(self.passes_s) < 2 * _PASSES:
             return self.passes_s
         return [
@@ -93,18 +93,18 @@ class RungRun:
             for start in range(0, len(self.passes_s) - _PASSES + 1, _PASSES)
         ]
 
-    def target_scans(self) -> int:
-        """Return how many (instant, target) pairs the block was asked about."""
+    def instant_count(self) -> int:
+        """Return the number of instants at which the block was run, over all its wakes."""
         return sum(len(wake) for wake in self.wakes)
 
 
 def run_rung(scene: Scene, block: str) -> RungRun:
-    """Run a scene, recording what it records and the wakes of one block."""
-    return run_watched(scene, [block])[block]
+    """Run a scene and return that run with its recorded tables and the wakes of one block."""
+    return run_with_recorded_wakes(scene, [block])[block]
 
 
-def run_watched(scene: Scene, blocks: Iterable[str]) -> dict[str, RungRun]:
-    """Run a scene once, recording what it records and the wakes of some blocks."""
+def run_with_recorded_wakes(scene: Scene, blocks: Iterable[str]) -> dict[str, RungRun]:
+    """Run a scene once; return by block that run with recorded tables and the block's wakes."""
     sink = MemorySink()
     simulation = Simulation(scene, recorder=Recorder([sink]))
     watches = {name: _WatchedBlock(simulation.components[name]) for name in blocks}
@@ -117,7 +117,7 @@ def run_watched(scene: Scene, blocks: Iterable[str]) -> dict[str, RungRun]:
 
 
 class _WatchedBlock:
-    """Keeps what a block is given, and how long it works on it."""
+    """Keeps every wake that a block is run with, and adds up the time that the block takes."""
 
     def __init__(self, component: Component) -> None:
         self.wakes: list[Wake] = []
@@ -152,8 +152,8 @@ def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
     for round_ in range(repeats * _PASSES):
         for index in range(len(fast)):
             run = fast[(index + round_) % len(fast)]
-            if len(run.passes_s) < run.passes(repeats * _PASSES):
-                run.passes_s.append(run.pass_s())
+            if len(run.passes_s) < run.affordable_passes(repeats * _PASSES):
+                run.passes_s.append(run.time_one_pass_s())
 
 
 def median_and_spread(repeats_s: Sequence[float]) -> tuple[float, float]:
@@ -182,7 +182,7 @@ class Spread:
 
     @classmethod
     def from_errors(cls, errors: FloatArray) -> "Spread":
-        """Return the spread of errors, leaving NaN out."""
+        """Return the mean, 95th percentile, maximum and number of the errors, leaving NaN out."""
         known = errors[~np.isnan(errors)]
         if known.size == 0:
             return cls(float("nan"), float("nan"), float("nan"), 0)
@@ -195,8 +195,8 @@ Values = tuple[IntArray, dict[str, AnyArray]]
 
 
 def replay_values(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
-    """Read a ladder's quantities from a fresh block over all its wakes."""
-    block, other = run.fresh(), reference.fresh()
+    """Return the ticks of all recorded wakes, and the ladder's values of a fresh block there."""
+    block, other = run.fresh_block(), reference.fresh_block()
     parts = [(wake.ticks, ladder.measure(block, wake, other)) for wake in run.wakes]
     ticks = np.concatenate([ticks for ticks, _ in parts])
     names = [q.name for q in ladder.quantities]
@@ -204,7 +204,7 @@ def replay_values(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
 
 
 def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:
-    """Return each quantity's error at the instants that both have."""
+    """Return the spread of each quantity's error at the ticks that both have."""
     ticks, values = rung
     other_ticks, others = reference
     _, here, there = np.intersect1d(ticks, other_ticks, return_indices=True)
@@ -218,11 +218,13 @@ def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str,
 def errors_against_precise(
     ladder: Ladder, run: RungRun, values: Values
 ) -> tuple[dict[str, Spread], str]:
-    """Return a rung's error against a far more precise evaluation, or why there is none."""
+    """Return the spread of a rung's errors against a far more precise evaluation, and a note on it;
+    without such an evaluation no errors and the reason.
+    """
     if ladder.truth is None:
         return {}, "nothing more exact is known"
     try:
-        parts = _evaluate_sample(ladder.truth, run, _sample_known(ladder, values), values[0])
+        parts = _evaluate_sample(ladder.truth, run, _sample_known_pairs(ladder, values), values[0])
     except ImportError as error:
         return {}, f"not measured: {error}"
     except Unavailable as error:
@@ -235,8 +237,8 @@ def errors_against_precise(
     return spreads, f"measured at {count} target-scans"
 
 
-def _sample_known(ladder: Ladder, values: Values) -> IntArray:
-    """Return (row, target) of a sample, evenly spread over what the first quantity knows."""
+def _sample_known_pairs(ladder: Ladder, values: Values) -> IntArray:
+    """Return up to `SAMPLE` (row, target) pairs (n, 2), evenly, where the first value is known."""
     first = values[1][ladder.quantities[0].name]
     unknown = np.isnan(first)
     pairs = np.unique(np.argwhere(~unknown)[:, :2], axis=0)
@@ -250,7 +252,7 @@ def _evaluate_sample(
 ) -> Sequence[Mapping[str, FloatArray]]:
     if len(pairs) == 0:
         raise Unavailable("no target-scan to measure at")
-    block = run.fresh()
+    block = run.fresh_block()
     parts = []
     start = 0
     for wake in run.wakes:

@@ -75,7 +75,7 @@ class Variants:
         block = scene_file.data["blocks"][choice.block]
         for key in choice.ladder.clears:
             block.pop(key, None)
-        values = choice.rung.changes(self._blocks[choice.block])
+        values = choice.rung.parameters_to_set(self._blocks[choice.block])
         if choice.rung.type_name:
             swap_type(scene_file, choice.block, choice.rung.type_name, COMMAND_LINE)
             if scene_file.problems:

@@ -16,18 +16,18 @@ from typing import Any
 import numpy as np
 from networkx import ancestors
 
-from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
+from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, may_end_its_run
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_installed
 from dsa_des.block.foreign_calls import is_stop_request
 from dsa_des.block.message import Message
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import Problem, SceneError
 from dsa_des.running.channel import Inputs
 from dsa_des.running.node import Node
 from dsa_des.running.simulation import Simulation, block_failure
-from dsa_des.scene.graph import cycle_numbers
+from dsa_des.scene.graph import loop_number_by_block
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire as WireOfScene
 from dsa_des.time.clock import MAX_TICK, ScanCursor, parse_rational
@@ -49,13 +49,13 @@ for _constant in (_FIRST_ROW, _NO_ROW, _NO_SCAN):
 
 def __getattr__(name: str) -> Any:
     if name in entry_points_of(EMBED):
-        return load_installed(entry_points_of(EMBED)[name])
+        return load_unnamed_entry_point(entry_points_of(EMBED)[name])
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 
 @dataclass
 class Step:
-    """One call: what was due, and what the blocks sent.
+    """What one call by the host did: which scans the blocks made, and which messages they sent.
 
     Parameters
     ----------
@@ -74,7 +74,7 @@ class Step:
     sent: dict[tuple[str, str], Message] = field(default_factory=dict)
 
     def of(self, block: str) -> Any:
-        """Return the message of a block with one output, or None if it sent nothing."""
+        """Return a block's message in this step (of the first output), or None if none was sent."""
         for (name, _), message in self.sent.items():
             if name == block:
                 return message
@@ -82,7 +82,7 @@ class Step:
 
 
 class _Wire:
-    """One wire into a block: what it holds, or what waits on it."""
+    """One wire into a block: keeps the last message, or all messages since its last run."""
 
     def __init__(self, sender: tuple[str, str], declared: Input) -> None:
         self.sender, self.source = sender, sender[0]
@@ -91,18 +91,18 @@ class _Wire:
         self._waiting: list[tuple[int, Message]] = []
 
     def push(self, tick: int, message: Message) -> None:
-        """Take a message that arrives."""
+        """Store a message that arrives: in place of the last one, or at the end of the queue."""
         if self.held:
             self._last = message
         else:
             self._waiting.append((tick, message))
 
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return the last message, and its last row."""
-        return None if self._last is None else (self._last, _last_row(self._last))
+        """Return the last message and the index of its last row; None if none has arrived."""
+        return None if self._last is None else (self._last, _index_of_last_row(self._last))
 
     def collect(self, end: int) -> tuple[RunTicks, Message] | None:
-        """Take what waits."""
+        """Empty the queue; return its messages as one, with arrival instants; None if empty."""
         if not self._waiting:
             return None
         messages = [message for _, message in self._waiting]
@@ -119,7 +119,7 @@ class _Runner:
         component = self.component = node.component
         self.name, self.cursor = component.name, cursor
         self.before = None if node.clock is None else node.clock.previous_ticks
-        self.pulse = None if node.pulse is None else ScanCursor(node.pulse.first)
+        self.pulse = None if node.pulse is None else ScanCursor(node.pulse.first_run_clock)
         self.demands = [] if cursor else [demand.block for demand in node.demands]
         into: dict[str, list[_Wire]] = {}
         for wire in wires:
@@ -175,7 +175,7 @@ class HostDriven:
             node = nodes[name]
             if name == self.source or name not in needed:
                 continue
-            cursor = None if node.clock is None else ScanCursor(node.clock.first)
+            cursor = None if node.clock is None else ScanCursor(node.clock.first_run_clock)
             runners.append(_Runner(node, cursor, self.scene.wires))
         return runners
 
@@ -218,7 +218,7 @@ class HostDriven:
         return self._snap_to_scan(tick, drift) if drift else tick
 
     def _snap_to_scan(self, tick: int, drift: int) -> int:
-        """Return the instant of the next scan of a block that lies so near, or the tick itself."""
+        """Return the tick of the block's scan within `drift` of the given tick, or that tick."""
         if self.last_tick - drift <= tick < self.last_tick:
             return self.last_tick  # that scan was made already
         drift = min(drift, (tick - self.last_tick) // _NEAR)
@@ -231,17 +231,19 @@ class HostDriven:
 
         That is by default the last call's; before the first call that is the very first scan.
         """
-        return self.scan_after(self.last_tick if after_s is None else self.tick_of(after_s))
+        return self.next_scan_after_tick_s(
+            self.last_tick if after_s is None else self.tick_of(after_s)
+        )
 
-    def scan_after(self, after: int) -> float:
-        """Return the same for a tick."""
+    def next_scan_after_tick_s(self, after: int) -> float:
+        """Return the time, s, of the first scan of any block after the tick `after`."""
         return (
             min(cursor.next_scan_tick(after) for cursor in self._cursors.values())
             / self.ticks_per_s
         )
 
-    def due(self, tick: int) -> Step:
-        """Return which scans are made by a call at `tick`.
+    def start_step(self, tick: int) -> Step:
+        """Move clocks on to `tick`; return a step with each block's scan and missed scans.
 
         Of the scans since the last call each block makes its latest one, now: a call takes as long
         as one scan of each, however long ago the last one was. The first call makes the scans of
@@ -263,7 +265,7 @@ class HostDriven:
         scans: dict[str, int] = {}
         missed: dict[str, int] = {}
         for name, cursor in self._cursors.items():
-            due = cursor.due(tick)
+            due = cursor.pop_due_scan(tick)
             if due is not None:
                 scans[name], late = due
                 if late:
@@ -280,7 +282,7 @@ class HostDriven:
         """
         sent, scans, tick = step.sent, step.scans, step.tick
         sent[self._source_key] = message
-        now = RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))
+        now = RunTicks(single_run_numbers(1), np.array([tick], dtype=np.int64))
         for runner in self._runners:
             triggered = False
             for wire in runner.wires:
@@ -292,14 +294,16 @@ class HostDriven:
             idle = None
             if runner.pulse is not None:
                 # It acts at the first call at or after each of its instants.
-                acts = runner.pulse.due(tick) is not None
+                acts = runner.pulse.pop_due_scan(tick) is not None
                 idle = np.array([scan is None and not triggered])
                 triggered = triggered or acts
             if scan is None and not triggered:
                 continue
             own = _NO_SCAN if scan is None else np.array([scan], dtype=np.int64)
             demand = partial(_scanning_rows, runner.demands, scans) if runner.demands else None
-            wake = runner.inputs.wake_at(now, own, tick + 1, demand, clock=runner.before, idle=idle)
+            wake = runner.inputs.make_wake(
+                now, own, tick + 1, demand, clock=runner.before, idle=idle
+            )
             if wake is None:
                 continue
             try:
@@ -321,7 +325,7 @@ class HostDriven:
         return step
 
 
-def _last_row(message: Message) -> IntArray:
+def _index_of_last_row(message: Message) -> IntArray:
     count = len(message.tick)
     return _FIRST_ROW if count == 1 else np.array([count - 1])
 
@@ -329,14 +333,14 @@ def _last_row(message: Message) -> IntArray:
 def _scanning_rows(
     blocks: Iterable[str], scanning: Container[str], asked: RunTicks
 ) -> dict[str, IntArray]:
-    """Return for each block the one row of a step where it scans, and none where it does not."""
+    """Return for each block the row index 0 if it scans in this step, else no index."""
     return {name: _FIRST_ROW if name in scanning else _NO_ROW for name in blocks}
 
 
 def _unsupported_parts(scene: Scene, source: str) -> list[Problem]:
-    """Say what of a scene needs an event queue."""
+    """Return a problem for each part that a host cannot drive as it needs an event queue."""
     refusals: list[tuple[str, str]] = []
-    looped = cycle_numbers(scene.graph)
+    looped = loop_number_by_block(scene.graph)
     if looped:
         refusals.append(("wires", f"feedback between {', '.join(sorted(looped))}"))
     if scene.changes:

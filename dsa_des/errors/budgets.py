@@ -23,7 +23,7 @@ _SIZES = ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (0.0, "kB"))
 
 
 def describe_long_work(asked: str, many: int, seconds_each: float, bytes_each: float) -> str:
-    """Return what to tell of work before it begins, nothing if it is short.
+    """Return a sentence on how long work takes and how much it writes; empty if it is short.
 
     Parameters
     ----------
@@ -54,8 +54,8 @@ def describe_long_work(asked: str, many: int, seconds_each: float, bytes_each: f
     return said if seconds > LONG_SECONDS or size > LARGE_BYTES else ""
 
 
-def refuse_samples(asked: str, samples: float) -> None:
-    """Raise UsageError if work would hold more samples of flights than memory does."""
+def check_sample_count(asked: str, samples: float) -> None:
+    """Raise UsageError if a piece of work would make more samples of flights than are allowed."""
     if samples > MOST_SAMPLES:
         raise UsageError(
             f"{asked}: makes {samples:.3g} samples of flights; at most {MOST_SAMPLES:,} are allowed"

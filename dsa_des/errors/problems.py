@@ -62,8 +62,8 @@ class Disagreements(ValueError):
         super().__init__("; ".join(self.texts))
 
     @classmethod
-    def refuse(cls, texts: Iterable[str]) -> None:
-        """Raise them, if there are any."""
+    def raise_if_any(cls, texts: Iterable[str]) -> None:
+        """Raise one exception with all the texts, if there are any."""
         if result := tuple(texts):
             raise cls(result)
 
@@ -75,7 +75,7 @@ class Lines(str):
 
     @classmethod
     def from_lines(cls, lines: Iterable[object]) -> "Lines":
-        """Return lines, made printable, as one message."""
+        """Return the lines, made printable, as one text of several lines."""
         return cls("\n".join(printable(line) for line in lines))
 
 
@@ -188,7 +188,7 @@ class BlockFailure(Exception):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of a command that it ends: 1, or 3 where a foreign part is the cause."""
+        """The command's exit code: the cause's if it has one (3: a foreign part), else 1."""
         return int(getattr(self.__cause__, "exit_code", 1))
 
     def __str__(self) -> str:
@@ -203,7 +203,7 @@ class SetupFailure(BlockFailure):
 
     @property
     def exit_code(self) -> int:
-        """Exit code of a command that it ends: 2, or 3 where a foreign part died."""
+        """The exit code of a command that ends with this error: 2, or 3 if a foreign part died."""
         return 3 if super().exit_code == 3 else 2
 
 

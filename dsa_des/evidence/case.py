@@ -20,8 +20,8 @@ from dsa_des.scene.overrides import apply_sets
 from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
-from dsa_des.studies.identity import results_of
 from dsa_des.studies.study import Study, format_set_value
+from dsa_des.studies.study_digest import results_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.text.run_commands import format_value
 
@@ -78,7 +78,7 @@ class CaseRequirement(Parameters):
         return high <= self.limit if self.most is not None else low >= self.limit
 
     def describe_limit(self) -> str:
-        """Return ``at most 0.3``, with the unit."""
+        """Return the limit as text with its unit, such as ``at most 0.3``."""
         return f"at {'most' if self.most is not None else 'least'} {self.limit:g} {self.unit}"
 
 
@@ -130,7 +130,7 @@ class SensitivityKey(Parameters):
 
 
 class LeftOutItem(Parameters):
-    """What the case leaves out, and why it may."""
+    """Something that the case leaves out, and why it may be left out."""
 
     what: _Text
     why: _Text
@@ -236,7 +236,7 @@ def _load_system_study(file: SceneFile, tables: CaseTables, replicas: int | None
 def _sensitivity_study(
     file: SceneFile, tables: CaseTables, assessed: Study
 ) -> tuple[tuple[tuple[SensitivityKey, Any, str], ...], Study]:
-    """Return the changes of one parameter at a time, and the study of them."""
+    """Return (parameter, value, label) of all single changes, and a study with these as axis."""
     scene = assessed.scene(0).resolved()
     stated: dict[str, Any] = {}
     for index, one in enumerate(tables.sensitivity):
@@ -251,7 +251,7 @@ def _sensitivity_study(
             result = result[part]
         stated[one.key] = result
     varied = tuple(
-        (one, value, f"{one.key} = {case_value(value)}")
+        (one, value, f"{one.key} = {format_case_value(value)}")
         for one in tables.sensitivity for value in one.values
     )  # fmt: skip
     columns = {
@@ -268,13 +268,13 @@ def _sensitivity_study(
     return varied, read_study(tables.study, sets=_sets_of_system(tables), keys=keys)
 
 
-def case_value(value: Any) -> str:
-    """Return a value as a case's lines show it: as a scene would hold it."""
+def format_case_value(value: Any) -> str:
+    """Return a value as text in the form in which a scene file writes it."""
     return format_set_value(value) if isinstance(value, list | dict) else format_value(value)
 
 
 def _check_results(case: EvidenceCase) -> None:
-    """Report every result that no study gives."""
+    """Report results that the case names but its study lacks, and limits that are impossible."""
     named = [
         (("requirements", index), one.study, one.result)
         for index, one in enumerate(case.tables.requirements)
@@ -299,7 +299,7 @@ def _check_results(case: EvidenceCase) -> None:
 
 
 def _check_limit(case: EvidenceCase, at: tuple[str, int], study: str, result: str) -> None:
-    """Report a limit that says nothing: no value of its result is as low, or as high."""
+    """Report a requirement's limit outside the range of values that its result can have."""
     asked = case.tables.requirements[at[1]]
     low, high = case.results[study][result].bounds
     if low <= asked.limit <= high:
@@ -333,13 +333,13 @@ def _check_sources(case: EvidenceCase) -> None:
 
 
 def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
-    """Return the wires of a scene that delay or lose messages, as tables."""
+    """Return the wires of a scene that have options such as delay or loss, as dicts."""
     whole = [wire for wire in scene.resolved()["wires"] if isinstance(wire, dict)]
     return [dict(wire) for wire in whole if set(wire) - {"from", "to", "holds"}]
 
 
 def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
-    """Return where a parameter's value is from: that of the key, or else of its block."""
+    """Return a parameter's stated source: its key's, else its block's; None if there is neither."""
     known = {
         name.removeprefix("blocks."): str(text) for name, text in flatten_tables(sources).items()
     }

@@ -8,7 +8,7 @@ import numpy as np
 
 from dsa_des.block.mark import BLUE, RED, SKY
 from dsa_des.evidence.findings import Finding, ParameterChange
-from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, plain_log_ticks
+from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, set_plain_log_ticks
 
 _BAND, _LINE, _LIMIT, _RULE = SKY, BLUE, RED, "#999999"
 _MOST_BARS = 24
@@ -41,7 +41,7 @@ def draw_convergence(findings: Sequence[Finding], confidence: float) -> bytes:
             top = np.nanmax([*known, np.nanquantile(high, 0.8)]) if np.isfinite(high).any() else 1
             axes.set_ylim(0.0, 1.15 * float(top))
             axes.set_xscale("log")
-            plain_log_ticks(axes.xaxis)
+            set_plain_log_ticks(axes.xaxis)
             axes.set_ylabel(figure_text(asked.name, _LONGEST))
             # Above the plot: beside it, the words would take a third of its width.
             axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2, frameon=False)

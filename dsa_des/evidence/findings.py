@@ -15,7 +15,7 @@ from dsa_des.evidence.case import (
     SENSITIVITY,
     CaseRequirement,
     EvidenceCase,
-    case_value,
+    format_case_value,
 )
 from dsa_des.results.record import Result
 from dsa_des.results.statistics import Estimate
@@ -42,14 +42,14 @@ class Convergence:
     allowed: float
 
     @property
-    def holds(self) -> bool:
-        """Whether the estimate counts as known."""
+    def is_converged(self) -> bool:
+        """Whether the estimate moved no more than the rule allows over the last encounters."""
         return self.moved <= self.allowed
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A requirement with what the case shows of it."""
+    """A requirement with the estimate of its result and whether that estimate has converged."""
 
     requirement: CaseRequirement
     line: Line
@@ -57,9 +57,11 @@ class Finding:
 
     @property
     def verdict(self) -> str:
-        """One of ``met``, ``not met``, ``not shown`` (the interval holds the limit) or neither."""
+        """One of ``met``, ``not met``, ``not shown`` (the interval contains the limit), or not
+        known (not converged, or without an interval).
+        """
         e, asked = self.line.estimate, self.requirement
-        if not self.convergence.holds or math.isnan(e.low) or math.isnan(e.high):
+        if not self.convergence.is_converged or math.isnan(e.low) or math.isnan(e.high):
             return NOT_KNOWN
         if asked.is_met(e.low, e.high):
             return MET
@@ -69,7 +71,7 @@ class Finding:
 
 @dataclass(frozen=True)
 class ParameterChange:
-    """What one value of one parameter does to one result, paired on the same units."""
+    """The change of a result with another value of one parameter, paired run by run."""
 
     key: str
     unit: str
@@ -95,10 +97,10 @@ def findings_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Findin
 def convergence_of(
     case: EvidenceCase, tables: Tables, result: Result, asked: CaseRequirement
 ) -> Convergence:
-    """Return the running estimate of a result in order of the replicas, by the case's rule."""
+    """Return a result's estimates for growing replica numbers, and how far the last ones moved."""
     rule, rows, record = case.tables.convergence, tables.rows, tables.record
     ((_, chosen),) = list(rows.each_place())
-    counts, start = running_counts(len(chosen), rule.over_last)
+    counts, start = counts_of_running_estimate(len(chosen), rule.over_last)
 
     def estimate(many: int) -> Estimate:
         some: IntArray = chosen[:many]
@@ -113,8 +115,8 @@ def convergence_of(
     return Convergence(counts, estimates, start, moved, rule.share * whole)
 
 
-def running_counts(units: int, over_last: float) -> tuple[list[int], int]:
-    """Return at how many units the running estimate is taken, and from which count the rule counts.
+def counts_of_running_estimate(units: int, over_last: float) -> tuple[list[int], int]:
+    """Return ascending unit numbers for running estimates, and from which these must settle.
 
     The way there is spaced evenly in the logarithm, the last stretch evenly.
     """
@@ -125,8 +127,8 @@ def running_counts(units: int, over_last: float) -> tuple[list[int], int]:
     return counts, start
 
 
-def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[ParameterChange]:
-    """Return what every changed parameter does, the parameter that matters most first."""
+def parameter_changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[ParameterChange]:
+    """Return all parameter changes' effects on required results, the strongest parameter first."""
     if SENSITIVITY not in tables:
         return []
     mine = tables[SENSITIVITY]
@@ -154,20 +156,22 @@ def changes_of(case: EvidenceCase, tables: Mapping[str, Tables]) -> list[Paramet
 
 
 def _stated_values(case: EvidenceCase) -> dict[str, str]:
-    """Return the value of every changed parameter as the case states it."""
+    """Return key → stated value, as text, of every parameter that the sensitivity study changes."""
     study = case.studies[SENSITIVITY]
     (axis,) = [axis for axis in study.axes if axis.key == CHANGED]
     index = axis.labels.index(AS_STATED)
-    return {key: case_value(value) for key, value in axis.sets[index]}
+    return {key: format_case_value(value) for key, value in axis.sets[index]}
 
 
 def verdict_line(findings: Sequence[Finding]) -> str:
-    """Return the verdict in a line: what is not known, or else what does not pass, comes first."""
+    """Return the verdict as text: what is not known, if any; else what fails, then what passes."""
     by: dict[str, list[Finding]] = {}
     for one in findings:
         by.setdefault(one.verdict, []).append(one)
     if NOT_KNOWN in by:
-        return "No verdict: " + "; ".join(_unknown_reason(one) for one in by[NOT_KNOWN]) + "."
+        return (
+            "No verdict: " + "; ".join(_reason_for_no_verdict(one) for one in by[NOT_KNOWN]) + "."
+        )
     parts = []
     if fails := [*by.get(NOT_MET, []), *by.get(NOT_SHOWN, [])]:
         parts.append("Does not pass: " + "; ".join(map(_describe_finding, fails)) + ".")
@@ -183,13 +187,13 @@ def _describe_finding(one: Finding) -> str:
     return f"{asked.name} {interval}, asked {asked.describe_limit()}{shown}"
 
 
-def _unknown_reason(one: Finding) -> str:
+def _reason_for_no_verdict(one: Finding) -> str:
     c, asked = one.convergence, one.requirement
     if math.isnan(one.line.estimate.value):
         ratio = one.line.ratio
         why = f": {ratio.reason}" if ratio is not None and ratio.reason else ""
         return f"{asked.name} has no estimate after {c.counts[-1]:,} encounters{why}"
-    if not c.holds:
+    if not c.is_converged:
         return (
             f"{asked.name} has not converged: over the encounters from {c.last_from:,} to "
             f"{c.counts[-1]:,} it moved by up to {c.moved:.2g}, {c.allowed:.2g} is allowed; more "
@@ -198,8 +202,8 @@ def _unknown_reason(one: Finding) -> str:
     return f"{asked.name} has an estimate without an interval"
 
 
-def numbers_of(line: Line) -> dict[str, Any]:
-    """Return all numbers of a line as the machine-readable evidence holds them."""
+def result_line_as_dict(line: Line) -> dict[str, Any]:
+    """Return all numbers of a result's line as a dict, in the form of ``evidence.json``."""
     e = line.estimate
     numbers: dict[str, Any] = {
         "result": line.result.name, "meaning": line.result.meaning, "value": e.value, "low": e.low,

@@ -9,12 +9,18 @@ from typing import Any
 
 from dsa_des.block.ladder import Verified
 from dsa_des.block.shipped_files import example_folders
-from dsa_des.evidence.case import WIRES, EvidenceCase, case_value, source_of, wires_with_options
+from dsa_des.evidence.case import (
+    WIRES,
+    EvidenceCase,
+    format_case_value,
+    source_of,
+    wires_with_options,
+)
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
 from dsa_des.studies.draws import file_digest
-from dsa_des.studies.identity import files_of
 from dsa_des.studies.study import Study
+from dsa_des.studies.study_digest import study_input_files
 
 #: Where a parameter is written that no file states.
 DEFAULT = "default"
@@ -32,19 +38,21 @@ class CaseFiles:
     case: str
 
     def relative_name(self, text: str) -> str:
-        """Return a text that is a path of the case as a name below the root."""
+        """Return the name below the root of a file of the case, given its path; return other texts
+        unchanged, except that absolute paths keep only their last part.
+        """
         path = Path(os.path.abspath(text))
         if path in self.names:
             return self.names[path]
         return path.name if os.path.isabs(text) else text
 
     def digests(self) -> list[dict[str, str]]:
-        """Return every file with the SHA-256 of its content, by name."""
+        """Return name and SHA-256 of every file of the case, sorted by name."""
         rows = [{"file": name, "sha256": file_digest(path)} for path, name in self.names.items()]
         return sorted(rows, key=lambda row: (row["file"], row["sha256"]))
 
-    def copies(self) -> dict[str, bytes]:
-        """Return the content of every file below the root, by its name there."""
+    def contents_by_name(self) -> dict[str, bytes]:
+        """Return name → content of every file of the case that lies below its root."""
         return {
             name: path.read_bytes()
             for path, name in self.names.items()
@@ -59,7 +67,7 @@ def files_of_case(case: EvidenceCase) -> CaseFiles:
     for study in case.studies.values():
         paths |= {Path(os.path.abspath(study.path)), *_existing_paths(study.base.sources.values())}
         paths |= set(_existing_paths(read_scene_file(study.path).sources.values()))
-        paths |= {Path(os.path.abspath(path)) for path in files_of(study)}
+        paths |= {Path(os.path.abspath(path)) for path in study_input_files(study)}
     shipped = [Path(os.path.abspath(folder)) for folder in example_folders()]
     home = next((folder for folder in shipped if own.is_relative_to(folder)), None)
     mine = [p for p in paths if not any(p.is_relative_to(folder) for folder in shipped)]
@@ -79,7 +87,9 @@ def _existing_paths(sources: Iterable[str]) -> list[Path]:
 
 
 def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
-    """Return every parameter of the system's blocks: value, meaning, where written, its source."""
+    """Return a dict for every parameter of the system's blocks and for every wire with options:
+    key, value, meaning, where it is written, and its stated source.
+    """
     study = case.system_study
     scene = study.scene(0)
     changed = {key.removeprefix("blocks.") for key, _ in study.sets}
@@ -96,7 +106,8 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
             rows.append({
                 "key": f"{name}.{key}",
                 "value": (
-                    files.relative_name(value) if isinstance(value, str) else case_value(value)
+                    files.relative_name(value) if isinstance(value,
+                    str) else format_case_value(value)
                 ),
                 "meaning": (fields[key].description or "") if key in fields else "",
                 "written_in": where,
@@ -106,7 +117,8 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
         way = f"{wire.pop('from')} -> {wire.pop('to')}"
         rows.append({
             "key": f"{WIRES}.{way}",
-            "value": ", ".join(f"{key} = {case_value(value)}" for key, value in wire.items()),
+            "value": ", ".join(f"{key} = {format_case_value(value)}" for key,
+            value in wire.items()),
             "meaning": "What the wire does to messages.",
             "written_in": files.relative_name(study.base.source_of((WIRES,))),
             "source": source_of(case.tables.sources, WIRES, way),
@@ -115,24 +127,24 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
 
 
 def models_of(study: Study) -> list[dict[str, Any]]:
-    """Return every block of a study's first scene with the references it was verified against."""
+    """Return a dict per block of the first scene: name, type, description, verification."""
     return [
         {
             "block": name, "type": block.type_name,
             "about": " ".join((block.cls.__doc__ or "").strip().partition("\n\n")[0].split()),
-            "verified": [one._asdict() for one in verified_of(block.cls)],
+            "verified": [one._asdict() for one in verifications_of_class(block.cls)],
         }
         for name, block in study.scene(0).blocks.items()
     ]  # fmt: skip
 
 
-def verified_of(cls: type) -> list[Verified]:
-    """Return the references that a block's class and its bases were verified against."""
+def verifications_of_class(cls: type) -> list[Verified]:
+    """Return what a block's class and bases were verified against, most general class first."""
     return [one for base in reversed(cls.__mro__) for one in vars(base).get("verified", ())]
 
 
 def digest_of_results(folder: StudyFolder) -> str:
-    """Return the SHA-256 of all rows of a study, whatever the folder and the parts they lie in."""
+    """Return the SHA-256 of a study's result rows without command and error; no folder in it."""
     import pyarrow as pa
 
     table = folder.results()

@@ -10,9 +10,9 @@ from dsa_des.evidence.findings import (
     Convergence,
     Finding,
     ParameterChange,
-    changes_of,
     findings_of,
-    numbers_of,
+    parameter_changes_of,
+    result_line_as_dict,
     verdict_line,
 )
 from dsa_des.evidence.inputs import (
@@ -42,7 +42,7 @@ class Pack:
         self.case, self.folders, self.tables = case, folders, tables
         self.files: CaseFiles = files_of_case(case)
         self.findings: list[Finding] = findings_of(case, tables)
-        self.changes: list[ParameterChange] = changes_of(case, tables)
+        self.changes: list[ParameterChange] = parameter_changes_of(case, tables)
         self.line = verdict_line(self.findings)
         words = ["dsa-des", "evidence", f"{INPUTS}/{self.files.case}"]
         words += [word for one in sets for word in ("--set", one)]
@@ -56,25 +56,26 @@ class Pack:
         return None if NOT_KNOWN in verdicts else verdicts == {MET}
 
     def evidence(self) -> dict[str, Any]:
-        """Return all of it as one table of plain values: no path, no time, nothing of this run."""
+        """Return all evidence as a dict of plain values, without paths or times: repeatable."""
         tables = self.case.tables
         return {
             "verdict": {"line": self.line, "passes": self.passes},
             "case": {"title": tables.title, "description": tables.description},
             "system": tables.system.model_dump(),
-            "requirements": [self._requirement(one) for one in self.findings],
-            "also": [numbers_of(line) for name in tables.also for line in self._lines(name)],
-            "beside": [self._describe_beside(one.name, one.about) for one in tables.beside],
-            "sample": self._sample(),
+            "requirements": [self._requirement_as_dict(one) for one in self.findings],
+            "also": [result_line_as_dict(line) for name in tables.also
+            for line in self._result_lines(name)],
+            "beside": [self._compared_study_as_dict(one.name, one.about) for one in tables.beside],
+            "sample": self._sample_as_dict(),
             "convergence": {
                 "rule": tables.convergence.text(),
                 "estimates": [_convergence_as_dict(one) for one in self.findings],
             },
             "sensitivity": [_change_as_dict(one) for one in self.changes],
-            "sensitivity_encounters": self._units(SENSITIVITY),
+            "sensitivity_encounters": self._replica_count(SENSITIVITY),
             "parameters": parameters_of(self.case, self.files),
             "models": models_of(self.case.system_study),
-            "left_out": self._omissions(),
+            "left_out": self._omissions_as_dict(),
             "seeds": {name: study.seed for name, study in self.case.studies.items()},
             "inputs": self.files.digests(),
             "results": [
@@ -86,45 +87,52 @@ class Pack:
             "command": self.command,
         }  # fmt: skip
 
-    def machine_readable(self) -> bytes:
+    def evidence_json(self) -> bytes:
         """Return the content of ``evidence.json``."""
         text = json_text(self.evidence(), digits=12, indent=1, ensure_ascii=False)
         return f"{text}\n".encode()
 
-    def _lines(self, name: str, study: str = ASSESSED) -> list[Any]:
+    def _result_lines(self, name: str, study: str = ASSESSED) -> list[Any]:
         return [line for line in self.tables[study].lines if line.result.name == name]
 
-    def _units(self, study: str) -> int:
+    def _replica_count(self, study: str) -> int:
         return self.case.studies[study].replicas if study in self.case.studies else 0
 
-    def _requirement(self, one: Finding) -> dict[str, Any]:
+    def _requirement_as_dict(self, one: Finding) -> dict[str, Any]:
         asked = one.requirement
-        numbers = numbers_of(one.line)
+        numbers = result_line_as_dict(one.line)
         return {
             "name": asked.name, "text": asked.text, "source": asked.source,
             "limit": asked.limit, "sense": "most" if asked.most is not None else "least",
             "unit": asked.unit, "study": asked.study, **numbers,
             "confidence": self.tables[asked.study].record.confidence,
             "moved": one.convergence.moved, "may_move": one.convergence.allowed,
-            "converged": one.convergence.holds, "verdict": one.verdict,
+            "converged": one.convergence.is_converged, "verdict": one.verdict,
         }  # fmt: skip
 
-    def _describe_beside(self, name: str, about: str) -> dict[str, Any]:
+    def _compared_study_as_dict(self, name: str, about: str) -> dict[str, Any]:
         wanted = [one.result for one in self.case.tables.requirements if one.study == ASSESSED]
         wanted += self.case.tables.also
-        numbers = [numbers_of(line) for one in wanted for line in self._lines(one, name)]
-        return {"name": name, "about": about, "encounters": self._units(name), "results": numbers}
+        numbers = [
+            result_line_as_dict(line) for one in wanted for line in self._result_lines(one, name)
+        ]
+        return {
+            "name": name,
+            "about": about,
+            "encounters": self._replica_count(name),
+            "results": numbers,
+        }
 
-    def _sample(self) -> dict[str, Any]:
+    def _sample_as_dict(self) -> dict[str, Any]:
         ratios = [one.line.ratio for one in self.findings if one.line.ratio is not None]
         size = ratios[0].effective_sample_size if ratios else None
         return {
             **self.case.tables.sample.model_dump(),
-            "encounters": self._units(ASSESSED), "effective_sample_size": size,
+            "encounters": self._replica_count(ASSESSED), "effective_sample_size": size,
             "drawn": [draw.key for draw in self.tables[ASSESSED].record.draws],
         }  # fmt: skip
 
-    def _omissions(self) -> dict[str, Any]:
+    def _omissions_as_dict(self) -> dict[str, Any]:
         explained = read_explained(self.folders[ASSESSED])
         scene = explained.scenes[0] if explained and explained.scenes else None
         return {

@@ -11,20 +11,20 @@ from markupsafe import Markup
 
 from dsa_des.evidence.inputs import DEFAULT
 from dsa_des.results.labels import readable_label, short_text
-from dsa_des.results.report import PAGE_HEAD, page_environment, page_part
+from dsa_des.results.report import PAGE_HEAD, read_page_template, report_jinja_environment
 from dsa_des.text.safe_text import printable
 
-_PAGE = PAGE_HEAD + page_part("evidence.html")
+_PAGE = PAGE_HEAD + read_page_template("evidence.html")
 
 
-def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes | None) -> bytes:
-    """Return the page of some evidence and its two pictures."""
+def evidence_html(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes | None) -> bytes:
+    """Return the HTML page of the evidence `e` with its two PNG figures, as bytes."""
     confidence = e["requirements"][0]["confidence"]
     lines = [*e["requirements"], *e["also"]]
     names = list(dict.fromkeys(line["result"] for line in lines if line.get("study") in
                                (None, "assessed")))  # fmt: skip
-    page = page_environment().from_string(_PAGE).render(
-        e=e, title=e["case"]["title"], verdict=_escape_whole(e["verdict"]["line"]),
+    page = report_jinja_environment().from_string(_PAGE).render(
+        e=e, title=e["case"]["title"], verdict=_escape_without_shortening(e["verdict"]["line"]),
         level=f"{100 * confidence:g} %",
         requirements=[
             (r["name"], f"at {r['sense']} {r['limit']:g} {r['unit']}", _number_text(r["value"]),
@@ -81,13 +81,15 @@ def evidence_page(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
     return page.encode()
 
 
-def _escape_whole(text: str) -> Markup:
-    """Return a text as it is, however long: what does not pass is not cut."""
+def _escape_without_shortening(text: str) -> Markup:
+    """Return a text escaped for HTML and not shortened, however long it is."""
     return Markup(escape(printable(text)))
 
 
 def _parameter_rows(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
-    """Return block, the source of most of its values, and its rows, whose own source may differ."""
+    """Return (block, source of most of its values, rows of its parameters) for each block; a row
+    names its own source only if that differs.
+    """
     by: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         by.setdefault(row["key"].partition(".")[0], []).append(row)
@@ -104,7 +106,7 @@ def _parameter_rows(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
 
 
 def _comparison_rows(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
-    """Return a row for the system and for each study beside it, with a column per result."""
+    """Return a table row per result for the system and each compared study; none without such."""
     own = [r for r in (*e["requirements"], *e["also"]) if r.get("study") in (None, "assessed")]
     rows = [(e["system"]["name"], own)] + [(one["name"], one["results"]) for one in e["beside"]]
     if len(rows) == 1:

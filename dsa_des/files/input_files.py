@@ -38,7 +38,7 @@ class NotText(InputFileError):
 
 
 def resolve_home(text: str) -> Path:
-    """Return a path with ``~`` at its start resolved."""
+    """Return a text as path with leading ``~`` as home folder; InputFileError if impossible."""
     if "\0" in text:
         raise InputFileError("holds a NUL character: no file can have such a name")
     try:
@@ -49,7 +49,7 @@ def resolve_home(text: str) -> Path:
 
 
 def readable_file_status(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.stat_result:
-    """Return the status of a regular file that may be read."""
+    """Return a regular file's status; InputFileError if it cannot be read or is too large."""
     try:
         status = path.stat()
     except FileNotFoundError:
@@ -70,7 +70,7 @@ def readable_file_status(path: Path, largest_bytes: int = LARGEST_BYTES) -> os.s
 
 
 def read_input_bytes(path: Path, largest_bytes: int = LARGEST_BYTES) -> bytes:
-    """Return what is in a regular file."""
+    """Return a regular file's content; InputFileError if unreadable or too large."""
     size = readable_file_status(path, largest_bytes).st_size
     try:
         with path.open("rb") as file:
@@ -95,8 +95,8 @@ def read_input_text(path: Path, largest_bytes: int = LARGEST_BYTES) -> str:
     return text.replace("\r\n", "\n")
 
 
-def cache_reads(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
-    """Make a reader of a file keep what it returned for the files that were read last.
+def cache_file_reads(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return a decorator for a file reader: it keeps the results of the `most` last read files.
 
     A file, or several in a tuple, is read again when its size or the time of its last change is
     another; one without status is read, so that the reader says what is wrong with it.
@@ -121,7 +121,7 @@ def cache_reads(most: int) -> Callable[[Callable[..., Any]], Callable[..., Any]]
 
 
 def is_regular_file(path: Path) -> bool:
-    """Tell whether a path is a regular file; what can be no path is none."""
+    """Return whether a path is a regular file; False also for a text that cannot be a path."""
     try:
         return path.is_file()
     except (OSError, ValueError, RuntimeError):
@@ -129,7 +129,7 @@ def is_regular_file(path: Path) -> bool:
 
 
 def is_folder(path: Path) -> bool:
-    """Tell whether a path is a folder; what can be no path is none."""
+    """Return whether a path is a folder; False also for a text that cannot be a path."""
     try:
         return path.is_dir()
     except (OSError, ValueError, RuntimeError):

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_names import name_refusal, reason_of
+from dsa_des.files.output_names import name_refusal, system_error_text
 from dsa_des.terminal.interruption import defer_signals
 
 #: Endings of the pictures that are drawn.
@@ -23,7 +23,7 @@ _ORDINARY = ("/dev/shm",)
 
 
 def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
-    """Write a file under a temporary name and rename it; where that fails nothing is left behind.
+    """Write a file under a temporary name, then rename it; a failure leaves nothing behind.
 
     A link that stands there is replaced; what it points to stays as it is. `to_disk` has the
     content on the disk before it takes its name, so that it is whole even after a loss of power.
@@ -37,8 +37,8 @@ def write_file(path: Path, content: bytes, *, to_disk: bool = False) -> None:
 
 @contextmanager
 def stream_file(path: Path) -> Iterator[BinaryIO]:
-    """Give a file to write to, which takes its name when the block ends well; see `write_file`."""
-    temporary = temporary_path(path)
+    """Yield a file to write; it is named `path` only if the context ends without an error."""
+    temporary = unused_temporary_path(path)
     try:
         with open(temporary, "xb") as stream:
             yield stream
@@ -51,8 +51,8 @@ def stream_file(path: Path) -> Iterator[BinaryIO]:
         raise
 
 
-def check_file(path: Path, option: str = "--out") -> None:
-    """Raise UsageError unless `path` can be written as a file; called before work begins.
+def check_file_writable(path: Path, option: str = "--out") -> None:
+    """Raise UsageError unless a file can be written at `path`; called before work begins.
 
     Files that a killed process has left half-written beside it are removed.
     """
@@ -63,17 +63,19 @@ def check_file(path: Path, option: str = "--out") -> None:
             raise UsageError(f"{option} {path}: there is no folder {path.parent}")
         if reason := _refusal_of_file(path):
             raise UsageError(f"{option} {path}: {reason}; the name of a file is needed")
-        remove_abandoned(path.parent)
-        trial = temporary_path(path)
+        remove_abandoned_temporary_files(path.parent)
+        trial = unused_temporary_path(path)
         with open(trial, "xb"):
             pass
         trial.unlink()
     except OSError as error:
-        raise UsageError(f"{option} {path}: cannot be written: {reason_of(error)}") from error
+        raise UsageError(
+            f"{option} {path}: cannot be written: {system_error_text(error)}"
+        ) from error
 
 
-def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> None:
-    """Raise UsageError unless a file's name ends as one of its kind does."""
+def check_file_ending(path: Path, endings: Sequence[str], option: str = "--out") -> None:
+    """Raise UsageError unless the name of a file has one of the given endings."""
     if path.suffix.lower() not in endings:
         meant = "" if path.suffix else f"; {path.name}{endings[0]} would do"
         raise UsageError(
@@ -82,7 +84,7 @@ def check_ending(path: Path, endings: Sequence[str], option: str = "--out") -> N
 
 
 def _refusal_of_file(path: Path) -> str | None:
-    """Return why no file may be written here, if so; devices would be replaced by it."""
+    """Return why no file may be written here (system folder, folder, device, pipe), or None."""
     folder = Path(os.path.realpath(path.parent))
     above = {str(one) for one in (folder, *folder.parents)}
     if above.intersection(_SYSTEM) and not above.intersection(_ORDINARY):
@@ -114,7 +116,7 @@ _OLD_S = 3600.0
 
 @contextmanager
 def temporary_folder(target: Path) -> Iterator[Path]:
-    """Give an empty folder beside `target`, on the same file system; it is gone afterwards.
+    """Yield an empty temporary folder beside `target`, on its file system; removed at the end.
 
     Parents of `target` that do not exist are made; those that are empty at the end are removed.
     """
@@ -123,8 +125,8 @@ def temporary_folder(target: Path) -> Iterator[Path]:
     lock: int | None = None
     try:
         with defer_signals():
-            remove_abandoned(target.parent)
-            folder, lock = _make_temporary_folder(target)
+            remove_abandoned_temporary_files(target.parent)
+            folder, lock = _make_locked_temporary_folder(target)
         yield folder
     finally:
         with defer_signals():
@@ -137,23 +139,23 @@ def temporary_folder(target: Path) -> Iterator[Path]:
                     parent.rmdir()
 
 
-def temporary_path(path: Path) -> Path:
-    """Return a name beside `path` that nothing has, for what is not finished."""
+def unused_temporary_path(path: Path) -> Path:
+    """Return a random unused path in the folder of `path`, for a file that is not finished."""
     return path.parent / f"{PREFIX}{os.urandom(6).hex()}"
 
 
-def _make_temporary_folder(target: Path) -> tuple[Path, int | None]:
+def _make_locked_temporary_folder(target: Path) -> tuple[Path, int | None]:
     for _ in range(_TRIES):
         target.parent.mkdir(parents=True, exist_ok=True)
         try:
-            folder = temporary_path(target)
+            folder = unused_temporary_path(target)
             folder.mkdir(0o700)
             lock = os.open(folder / _LOCK, os.O_RDWR | os.O_CREAT | os.O_EXCL, 0o600)
         except FileNotFoundError:  # a clean-up took the folder or its parent away
             continue
         try:
-            os.write(lock, json.dumps(_process_marker(target)).encode())
-            if lock_file(lock) is False or not _is_same_file(lock, folder / _LOCK):
+            os.write(lock, json.dumps(_temporary_folder_marker(target)).encode())
+            if try_lock_file(lock) is False or not _is_same_file(lock, folder / _LOCK):
                 os.close(lock)
                 continue
         except BaseException:
@@ -164,7 +166,7 @@ def _make_temporary_folder(target: Path) -> tuple[Path, int | None]:
     raise FileNotFoundError(f"no folder can be made in {target.parent}")
 
 
-def _process_marker(target: Path) -> dict[str, Any]:
+def _temporary_folder_marker(target: Path) -> dict[str, Any]:
     return {"dsa_des": _WHAT, "host": _host_name(), "target": target.name}
 
 
@@ -172,8 +174,8 @@ def _host_name() -> str:
     return os.uname().nodename if hasattr(os, "uname") else ""
 
 
-def lock_file(file: int) -> bool | None:
-    """Lock an open file; False if another process has it, None if it cannot be locked at all."""
+def try_lock_file(file: int) -> bool | None:
+    """Lock an open file without waiting; return True, False if taken, None if impossible."""
     if fcntl is None:
         return None
     try:
@@ -192,8 +194,8 @@ def _is_same_file(file: int, path: Path) -> bool:
         return False
 
 
-def remove_abandoned(parent: Path) -> None:
-    """Remove what killed processes of this user on this machine have left in a folder."""
+def remove_abandoned_temporary_files(parent: Path) -> None:
+    """Remove temporary items in `parent` left by this user's killed processes on this machine."""
     if fcntl is None:
         return
     with suppress(OSError):
@@ -203,19 +205,19 @@ def remove_abandoned(parent: Path) -> None:
                 continue
             with suppress(OSError):
                 if entry.is_dir(follow_symlinks=False):
-                    _remove_abandoned(Path(entry.path))
+                    _remove_abandoned_folder(Path(entry.path))
                 elif time.time() - about.st_mtime > _OLD_S:
                     os.unlink(entry.path)
 
 
-def _remove_abandoned(folder: Path) -> None:
+def _remove_abandoned_folder(folder: Path) -> None:
     try:
         lock = os.open(folder / _LOCK, os.O_RDWR | os.O_NOFOLLOW | os.O_NONBLOCK)
     except FileNotFoundError:
         folder.rmdir()  # its maker was killed at once, or makes another one
         return
     try:
-        if not lock_file(lock):
+        if not try_lock_file(lock):
             return
         content = os.read(lock, 1 << 16)
         if not content and os.listdir(folder) == [_LOCK]:

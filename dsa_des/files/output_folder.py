@@ -18,10 +18,10 @@ from dsa_des.files.output_file import EARLIER, temporary_folder
 from dsa_des.files.output_names import (
     absolute_location,
     check_folder_path,
-    claim_folder,
     describe_write_error,
+    make_numbered_folder,
     new_folder_name,
-    reason_of,
+    system_error_text,
     user_path,
 )
 from dsa_des.terminal.interruption import defer_signals
@@ -33,7 +33,7 @@ _MOST_READ = 1 << 20
 
 
 def add_file_list(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
-    """Return the content of ``run.json`` with the list of all files that are in the folder."""
+    """Return the content of ``run.json`` with a digest of every file that is in the folder now."""
     files = {
         name: _quick_digest(folder / name) for name in _file_names_below(folder) if name != RUN_JSON
     }
@@ -41,7 +41,7 @@ def add_file_list(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
 
 
 def foreign_files(folder: Path) -> list[str]:
-    """Return what of a folder dsa_des did not write, by its name in the folder, sorted.
+    """Return, sorted, a folder's files that dsa_des did not write or that changed since.
 
     All of it if the folder holds no ``run.json`` of ours; nothing if it is empty. A file that was
     changed since is not what we wrote.
@@ -69,7 +69,7 @@ def _read_listing(path: Path) -> dict[str, str] | None:
 
 
 def _file_names_below(folder: Path) -> Iterator[str]:
-    """Give the names of all files below a folder, and of folders that hold none, sorted."""
+    """Yield names, relative to the folder, of all files and empty folders below it, sorted."""
     for entry in sorted(os.scandir(folder), key=lambda entry: entry.name):
         inside = None
         if entry.is_dir(follow_symlinks=False):
@@ -78,7 +78,7 @@ def _file_names_below(folder: Path) -> Iterator[str]:
 
 
 def _quick_digest(path: Path) -> str:
-    """Return a digest of a file's length and its first MiB, or what it is instead of a file.
+    """Return a SHA-256 of a file's length and first MiB; ``no file`` if it is no regular file.
 
     Tables may be larger than memory; an edit of one changes its length or its beginning.
     """
@@ -108,18 +108,18 @@ class OutputFolder:
 
     @classmethod
     def from_option(cls, out: str | None, parent: Path, stem: str) -> "OutputFolder":
-        """Return what ``--out`` names, or else the next free ``parent/stem-NNN``."""
+        """Return the results folder that ``--out`` names, or the next free ``parent/stem-NNN``."""
         return cls(parent, stem) if out is None else cls(user_path(out))
 
     def check(self) -> None:
-        """Raise UsageError unless the results can go there."""
+        """Raise UsageError unless the results can be written to this folder."""
         check_folder_path(self.path)
         if self._stem is None and (reason := _replace_refusal(absolute_location(self.path))):
             raise UsageError(f"--out {self.path}: {reason}; choose a new name")
 
     @contextmanager
-    def writing(self) -> Iterator[Path]:
-        """Give a temporary folder; it takes its name when the block succeeds.
+    def write_then_rename(self) -> Iterator[Path]:
+        """Yield a temporary folder for results; it is renamed at the end if there is no error.
 
         When the block raises, nothing is left behind.
         """
@@ -135,9 +135,9 @@ class OutputFolder:
                 yield results
                 with defer_signals():
                     if self._stem is not None:
-                        self._take_number(results, path.parent)
+                        self._move_to_free_number(results, path.parent)
                     else:
-                        self._take_name(results, path, before, folder / EARLIER)
+                        self._replace_folder(results, path, before, folder / EARLIER)
         except BrokenPipeError:  # that of our output on the terminal
             raise
         except OSError as error:
@@ -145,11 +145,11 @@ class OutputFolder:
                 why = describe_write_error(error, path)
                 raise UsageError(f"--out {self.path}: cannot be written: {why}") from error
             raise OutputError(
-                f"{self.path}: the results cannot be written: {reason_of(error)}"
+                f"{self.path}: the results cannot be written: {system_error_text(error)}"
             ) from error
 
-    def _take_number(self, results: Path, parent: Path) -> None:
-        """Rename to the first number that is free when we are done, not when we began."""
+    def _move_to_free_number(self, results: Path, parent: Path) -> None:
+        """Rename the finished results to the first free ``stem-NNN``."""
         assert self._stem is not None
         while True:
             self.path = new_folder_name(self._home, self._stem)
@@ -162,21 +162,21 @@ class OutputFolder:
                 raise
             return
 
-    def _take_name(
+    def _replace_folder(
         self, results: Path, path: Path, before: tuple[int, ...] | None, earlier: Path
     ) -> None:
-        """Replace what was there when we began, and nothing else."""
+        """Give results their final name; replace earlier ones only if unchanged since the start."""
         reason: str | None = "has come to be there while the results were made"
         if _folder_fingerprint(path) is None:
             reason = None
         elif _folder_fingerprint(path) == before:
-            reason = _move_aside(path, earlier)
+            reason = _move_earlier_results(path, earlier)
         if reason is None:
             try:
                 results.rename(path)
                 return
             except OSError as error:
-                reason = f"cannot be replaced: {reason_of(error)}"
+                reason = f"cannot be replaced: {system_error_text(error)}"
                 if earlier.exists():
                     with suppress(OSError):
                         earlier.rename(path)
@@ -188,15 +188,15 @@ class OutputFolder:
 
 
 @contextmanager
-def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
-    """Make a folder for results that come one by one; it is removed again if none came.
+def make_results_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
+    """Yield a new folder for results; it is removed when the context ends if it is still empty.
 
     It is what ``--out`` names, which must be new or empty, or the next free ``parent/stem-NNN``.
     """
     folder = parent / stem if out is None else user_path(out)
     made = [above for above in folder.parents if not os.path.lexists(above)]
     if out is None:
-        folder = claim_folder(parent, stem)
+        folder = make_numbered_folder(parent, stem)
         made.insert(0, folder)
     elif _make_empty_folder(folder):
         made.insert(0, folder)
@@ -210,7 +210,7 @@ def new_folder(out: str | None, parent: Path, stem: str) -> Iterator[Path]:
 
 
 def _make_empty_folder(folder: Path) -> bool:
-    """Make a folder unless an empty one is there; return whether it was made."""
+    """Make a folder and return True; False if there is an empty one; UsageError if it is filled."""
     try:
         if os.path.lexists(folder) and (not folder.is_dir() or any(folder.iterdir())):
             raise UsageError(f"--out {folder}: is there already; a new folder is needed")
@@ -223,25 +223,25 @@ def _make_empty_folder(folder: Path) -> bool:
     return new
 
 
-def _move_aside(path: Path, earlier: Path) -> str | None:
-    """Move earlier results out of the way, or return why they must stay."""
+def _move_earlier_results(path: Path, earlier: Path) -> str | None:
+    """Move results from `path` to `earlier` and return None, or the reason if they must stay."""
     try:
         path.rename(earlier)
     except OSError as error:
-        return f"cannot be replaced: {reason_of(error)}"
+        return f"cannot be replaced: {system_error_text(error)}"
     if reason := _replace_refusal(earlier):
         earlier.rename(path)
     return reason
 
 
 def _replace_refusal(path: Path) -> str | None:
-    """Return why a folder must not be replaced, if so."""
+    """Return why a folder (with files dsa_des did not write) must not be replaced, or None."""
     if not os.path.lexists(path):
         return None
     try:
         foreign = foreign_files(path)
     except OSError as error:
-        return f"cannot be read: {reason_of(error)}"
+        return f"cannot be read: {system_error_text(error)}"
     if not foreign:
         return None
     shown = ", ".join(foreign[:_MOST_SHOWN])
@@ -251,7 +251,7 @@ def _replace_refusal(path: Path) -> str | None:
 
 
 def _folder_fingerprint(path: Path) -> tuple[int, ...] | None:
-    """Return what tells a folder from another one and from a later state of itself."""
+    """Return numbers that change with a folder or its entries; None if there is no such folder."""
     try:
         about = path.lstat()
     except FileNotFoundError:

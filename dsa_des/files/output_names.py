@@ -19,7 +19,7 @@ _MOUNTS = Path("/proc/self/mountinfo")
 
 
 def user_path(text: str, option: str = "--out") -> Path:
-    """Return the path that a user wrote, with ``~`` for the home folder."""
+    """Return a typed path with ``~`` as the home folder; UsageError if it cannot be a path."""
     if not text.strip():
         raise UsageError(f"{option} {text!r}: is empty; a name is needed")
     if reason := name_refusal(text):
@@ -36,7 +36,7 @@ def user_path(text: str, option: str = "--out") -> Path:
 
 
 def name_refusal(path: str | Path) -> str | None:
-    """Return why no file can have this name, if so."""
+    """Return why no file can have this name, or None if one can."""
     text = os.fspath(path)
     if "\0" in text:
         return "a name cannot hold the character NUL"
@@ -47,18 +47,18 @@ def name_refusal(path: str | Path) -> str | None:
     return None
 
 
-def reason_of(error: OSError) -> str:
-    """Return what an error of the system says, without the names that it may hold."""
+def system_error_text(error: OSError) -> str:
+    """Return the text of a system error without the file names that it may contain."""
     return os.strerror(error.errno) if error.errno else str(error)
 
 
 def describe_write_error(error: OSError, path: Path) -> str:
-    """Return the reason of a system error at a path that was to be made or written into.
+    """Return the reason why a file or folder could not be written at `path`.
 
     Some file systems (``/proc``) take no folder and call it missing: what is there is named.
     """
     if error.errno != errno.ENOENT or path.exists():
-        return reason_of(error)
+        return system_error_text(error)
     there = next(parent for parent in path.absolute().parents if os.path.lexists(parent))
     return f"no folder can be made in {there}"
 
@@ -71,8 +71,8 @@ def new_folder_name(parent: Path, stem: str) -> Path:
     return parent / f"{stem}-{number:03d}"
 
 
-def claim_folder(parent: Path, stem: str) -> Path:
-    """Make the first of ``parent/stem-001``, ... that does not exist, and return it.
+def make_numbered_folder(parent: Path, stem: str) -> Path:
+    """Make the first missing one of ``parent/stem-001``, ``-002``, ... and return its path.
 
     Of processes that do so at once each gets a folder of its own.
     """
@@ -92,14 +92,14 @@ def claim_folder(parent: Path, stem: str) -> Path:
 
 
 def absolute_location(folder: Path) -> Path:
-    """Return where a folder is, without links above it, whatever the working directory becomes."""
+    """Return a folder's absolute path, with links resolved in its parents but not itself."""
     if folder.name in ("", ".."):
         return Path(os.path.realpath(folder))
     return Path(os.path.realpath(folder.parent)) / folder.name
 
 
 def check_folder_path(folder: Path, option: str = "--out") -> None:
-    """Raise UsageError unless a folder can be made at this path, or one is there to be used.
+    """Raise UsageError unless a folder can be made at this path or there is one already.
 
     What is in a folder that is there is not looked at.
     """
@@ -110,7 +110,7 @@ def check_folder_path(folder: Path, option: str = "--out") -> None:
             folder.parent.lstat()  # it must be there: .. leads out of nothing that is not
         reason = _folder_path_refusal(absolute_location(folder))
     except OSError as error:
-        reason = f"cannot be written: {reason_of(error)}"
+        reason = f"cannot be written: {system_error_text(error)}"
     if reason is not None:
         raise UsageError(f"{option} {folder}: {reason}")
 
@@ -138,7 +138,7 @@ def _folder_path_refusal(path: Path) -> str | None:
 
 
 def _raise_if_too_long(location: Path) -> None:
-    """Raise OSError if the system refuses a part of the path, or names inside it."""
+    """Raise OSError if the path, or a long file name inside it, is too long for the system."""
     there = next(parent for parent in (location, *location.parents) if os.path.lexists(parent))
     parts = location.relative_to(there).parts
     for path in (*(there / part for part in parts), location / ("x" * _LONGEST_INSIDE)):
@@ -147,13 +147,13 @@ def _raise_if_too_long(location: Path) -> None:
 
 
 def _protected_folders() -> list[tuple[str, Path]]:
-    """Return folders that are never replaced, and neither is what holds them."""
+    """Return (description, path) of the folders never replaced: working directory and home."""
     home = os.path.realpath(os.path.expanduser("~"))
     return [("the working directory", Path.cwd()), ("your home folder", Path(home))]
 
 
 def _mount_points() -> set[str]:
-    """Return all mount points; ``os.path.ismount`` does not know those of the same device."""
+    """Return the paths of all mount points, also of those on the same device."""
     try:
         lines = _MOUNTS.read_text(encoding="utf-8", errors="surrogateescape").splitlines()
     except OSError:

@@ -23,8 +23,8 @@ _NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 _BINARY = getattr(os, "O_BINARY", 0)
 
 
-def read_regular(path: Path, most: int | None = None) -> bytes:
-    """Return the content of a file that is no link, folder, pipe or device.
+def read_regular_file(path: Path, most: int | None = None) -> bytes:
+    """Return a regular file's content; OSError if it is not one or has more than `most` bytes.
 
     `most` is the largest size in bytes.
     """
@@ -37,8 +37,8 @@ def read_regular(path: Path, most: int | None = None) -> bytes:
         return file.read()
 
 
-def open_lock(path: Path) -> int:
-    """Return the descriptor of a lock file, made if need be; its content is never touched."""
+def open_lock_file(path: Path) -> int:
+    """Open a lock file, which is made if it does not exist, and return its file descriptor."""
     number = os.open(path, os.O_RDWR | os.O_CREAT | _NO_FOLLOW | _NO_WAIT, 0o666)
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)
@@ -58,7 +58,7 @@ ABOUT = b"dsa_des.about"
 
 
 def sealable_parquet(table: "pa.Table", about: bytes = b"") -> bytes:
-    """Return a table as the bytes of a Parquet file that can be sealed.
+    """Return a table as the bytes of a Parquet file with empty space for a seal.
 
     `about` says something of all its rows; it stands in the metadata of the table that is read.
     """
@@ -72,8 +72,8 @@ def sealable_parquet(table: "pa.Table", about: bytes = b"") -> bytes:
     return buffer.getvalue()
 
 
-def seal_content(content: bytes, owner: str) -> bytes:
-    """Return a file of `parquet` with its digest; `owner` says whose it is."""
+def seal_parquet(content: bytes, owner: str) -> bytes:
+    """Return the bytes of a `sealable_parquet` file with its digest and owner written into it."""
     index = _seal_start(content)
     if index is None:
         raise ValueError("cannot be sealed: it was not written by parquet()")
@@ -82,7 +82,7 @@ def seal_content(content: bytes, owner: str) -> bytes:
 
 
 def is_sealed(content: bytes, owner: str) -> bool:
-    """Return whether these are the bytes that were sealed for `owner`."""
+    """Return whether a file's bytes have a valid seal for `owner`."""
     index = _seal_start(content)
     if index is None:
         return False

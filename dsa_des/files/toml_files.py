@@ -58,15 +58,15 @@ def parse_toml(text: str) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as error:
         raise NotToml(f"is not valid TOML: {toml_reason(error)}") from None
     except RecursionError:
-        raise TomlError(_depth_message()) from None
+        raise TomlError(_too_deep_message()) from None
     except ValueError:  # Python's own limit on the digits of an integer
-        raise TomlError(_length_message()) from None
-    _refuse_extremes(tables)
+        raise TomlError(_too_long_number_message()) from None
+    _check_depth_and_numbers(tables)
     return tables
 
 
-def _refuse_extremes(tables: dict[str, Any]) -> None:
-    """Refuse what is nested too deeply and whole numbers that are too long, level by level."""
+def _check_depth_and_numbers(tables: dict[str, Any]) -> None:
+    """Raise TomlError if tables and lists are nested too deeply or a whole number is too long."""
     level: list[Any] = [tables]
     for _ in range(DEEPEST):
         below: list[Any] = []
@@ -75,18 +75,18 @@ def _refuse_extremes(tables: dict[str, Any]) -> None:
                 if isinstance(value, dict | list):
                     below.append(value)
                 elif isinstance(value, int) and abs(value) >= _LARGEST_WHOLE:
-                    raise TomlError(_length_message())
+                    raise TomlError(_too_long_number_message())
         if not below:
             return
         level = below
-    raise TomlError(_depth_message())
+    raise TomlError(_too_deep_message())
 
 
-def _depth_message() -> str:
+def _too_deep_message() -> str:
     return f"tables and lists are nested too deeply: at most {DEEPEST} inside each other"
 
 
-def _length_message() -> str:
+def _too_long_number_message() -> str:
     return f"a whole number has too many digits: at most {MOST_DIGITS} are allowed"
 
 
@@ -94,7 +94,7 @@ _BARE = set("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_-")
 
 
 def to_toml(tables: Mapping[str, Any]) -> str:
-    """Return the tables as TOML text; values come before the tables they stand beside."""
+    """Return tables as TOML text; in each table the plain values come before its subtables."""
     lines: list[str] = []
     _append_table(tables, (), lines)
     return "\n".join(lines).strip() + "\n"

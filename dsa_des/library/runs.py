@@ -10,12 +10,12 @@ from typing import Any
 from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
-from dsa_des.library.scenes import scene_of_any
+from dsa_des.library.scenes import as_scene
 from dsa_des.record.drawing import keep_figures
-from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
 from dsa_des.record.sinks import MemorySink, ObserverSink
+from dsa_des.record.table_metadata import metadata_of_run
 from dsa_des.running.recorded_run import record_run, run_json_content, summarise_run
 from dsa_des.running.reports import Report, draw_all_reports, load_reports, notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -57,7 +57,7 @@ def run(
     UsageError, OutputError
         If the results cannot go into the folder.
     """
-    loaded = scene_of_any(scene)
+    loaded = as_scene(scene)
     if out is None:
         return _run_in_memory(loaded, simulate_everything, progress)
     target = OutputFolder.from_option(os.fspath(out), Path("runs"), loaded.path.stem)
@@ -93,15 +93,21 @@ def _run_in_memory(
     )
     if noted or notes:
         info["notes"] = [*noted, *notes]
-    said = notes_of(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
+    said = metadata_of_run(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
     arrow = said.attach(tables.tables())
-    return Run(None, info, arrow, text, lambda: _draw_reports(reports, simulation, arrow, summary))
+    return Run(
+        None,
+        info,
+        arrow,
+        text,
+        lambda: _figures_of_run_in_memory(reports, simulation, arrow, summary),
+    )
 
 
-def _draw_reports(
+def _figures_of_run_in_memory(
     reports: list[Report], simulation: Simulation, tables: dict[str, Any], summary: dict[str, Any]
 ) -> dict[str, Any]:
-    """Return what reports draw of a run in memory: they read its tables from a folder."""
+    """Return report figures, by name, of a run in memory; its tables go to a temporary folder."""
     import pyarrow.parquet as pq
 
     with TemporaryDirectory(prefix="dsa_des-") as path:

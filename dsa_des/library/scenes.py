@@ -7,8 +7,8 @@ from typing import Any
 
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.examples import examples, find_example
-from dsa_des.scene.overrides import read_changes, scene_value
-from dsa_des.scene.scene import Scene, changed_tables
+from dsa_des.scene.overrides import read_changes, to_scene_value
+from dsa_des.scene.scene import Scene, scene_with_changes
 from dsa_des.scene.scene_file import SceneFile, read_scene_file, read_scene_tables
 
 #: What messages call a scene that is given as a table, and its title where it has none.
@@ -45,20 +45,20 @@ def load_scene(
     changes, problems = read_changes(sets, swaps, seed, duration_s)
     if problems:
         raise SceneError(problems)
-    return changed_tables(_read_source(source), tuple(changes))
+    return scene_with_changes(_read_source(source), tuple(changes))
 
 
-def scene_of_any(source: "Scene | str | os.PathLike[str] | Mapping[str, Any]") -> Scene:
-    """Return a scene as it is, or load it; see `load_scene`."""
+def as_scene(source: "Scene | str | os.PathLike[str] | Mapping[str, Any]") -> Scene:
+    """Return `source` if it is a scene already, else load it with `load_scene`."""
     return source if isinstance(source, Scene) else load_scene(source)
 
 
 def _read_source(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFile:
     if isinstance(source, Mapping):
         try:
-            return read_scene_tables(scene_value(source), _TABLE)
+            return read_scene_tables(to_scene_value(source), _TABLE)
         except TypeError as error:
-            raise SceneError([_explain_tables(source, str(error))]) from None
+            raise SceneError([_find_unusable_value(source, str(error))]) from None
     if not isinstance(source, str | os.PathLike):
         message = "must be a path, the name of a shipped scene, or a table"
         raise SceneError([Problem("load_scene", "", message, source)])
@@ -74,18 +74,18 @@ def _read_source(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFil
     return read_scene_file(path)
 
 
-def _explain_tables(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
-    """Return which value of some tables is none of a scene."""
+def _find_unusable_value(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
+    """Return a problem that names the first value of the tables that cannot be in a scene."""
     for name, value in tables.items():
         inner = f"{key}.{name}" if key else str(name)
         if isinstance(value, Mapping):
             try:
-                scene_value(value)
+                to_scene_value(value)
             except TypeError:
-                return _explain_tables(value, message, inner)
+                return _find_unusable_value(value, message, inner)
             continue
         try:
-            scene_value(value)
+            to_scene_value(value)
         except TypeError as error:
             return Problem(_TABLE, inner, str(error))
     return Problem(_TABLE, key, message)

@@ -10,25 +10,25 @@ from tempfile import mkdtemp
 from typing import TYPE_CHECKING, Any
 from weakref import finalize
 
-from dsa_des.block.registry import classes_in
+from dsa_des.block.registry import class_texts_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
-from dsa_des.library.scenes import scene_of_any
+from dsa_des.library.scenes import as_scene
 from dsa_des.record.drawing import keep_figures, pictures_in
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.printing import print_study_tables
 from dsa_des.results.tables import DIFFERENCES, SUMMARY
 from dsa_des.scene.examples import find_input_file
-from dsa_des.scene.overrides import SWAP, Change, apply_changes, scene_value
+from dsa_des.scene.overrides import SWAP, Change, apply_changes, to_scene_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.executors import default_workers, make_executor
-from dsa_des.studies.identity import description_text
 from dsa_des.studies.metric import METRICS, Metric
 from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
-from dsa_des.studies.study import Study, changed_scene, command_of
+from dsa_des.studies.study import Study, changed_scene, portable_command_line
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study, study_of_tables
-from dsa_des.terminal.terminal import html_of, text_of
+from dsa_des.terminal.terminal import capture_html, capture_text
 from dsa_des.text.safe_text import shorten
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ _BY_A_PROGRAM = "# run by a program with dsa_des.study(...); its tables stand in
 
 
 class StudyResult:
-    """What a study came to.
+    """The results of a study: tables, runs and figures.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ class StudyResult:
 
     @property
     def path(self) -> Path | None:
-        """Its folder, if one was asked for."""
+        """The folder of the study, or None if none was asked for."""
         return self._folder.path if self._home is None else None
 
     @cached_property
@@ -105,10 +105,10 @@ class StudyResult:
         return table
 
     def _repr_html_(self) -> str:
-        return html_of(lambda console: print_study_tables(console, self._tables))
+        return capture_html(lambda console: print_study_tables(console, self._tables))
 
     def __str__(self) -> str:
-        return text_of(lambda console: print_study_tables(console, self._tables), 160)
+        return capture_text(lambda console: print_study_tables(console, self._tables), 160)
 
     def __repr__(self) -> str:
         rows = self._tables.rows
@@ -140,7 +140,7 @@ def study(
     progress: Callable[[Progress], None] | None = None,
     **more: Any,
 ) -> StudyResult:
-    """Run a scene over axes, random draws and replicas; or a study file as it is.
+    """Run a scene over axes, draws and replicas, or a study file, and return the results.
 
     Parameters
     ----------
@@ -191,7 +191,7 @@ def study(
     if sets := list(sets):
         message = "changes a study file; a scene is changed with load_scene(..., sets=...)"
         raise SceneError([Problem("study", "sets", message, sets)])
-    loaded = scene_of_any(scene)
+    loaded = as_scene(scene)
     given = {
         "title": loaded.title,
         "seed": 0 if seed is None else seed,
@@ -211,7 +211,7 @@ def study(
 
 
 def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -> Study:
-    """Read a study file, given by its path or as a shipped one by its name."""
+    """Return the study that a study file describes, by path or name of a shipped one."""
     if not isinstance(source, str | os.PathLike):
         message = "is missing: a scene is measured by metrics; only a study file names its own"
         raise SceneError([Problem("study", "metrics", message)])
@@ -221,16 +221,18 @@ def _study_of_file(source: Any, given: Mapping[str, Any], sets: Iterable[str]) -
     described.repeat = _BY_A_PROGRAM
     if given.keys() <= {"replicas", "seed"}:
         words = [word for key, value in given.items() for word in (f"--{key}", str(value))]
-        described.repeat = command_of(["study", *words], sets, path)
+        described.repeat = portable_command_line(["study", *words], sets, path)
     return described
 
 
 def _keywords_as_tables(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return keywords as the tables of a study file."""
+    """Return keyword arguments in the form of the tables of a study file."""
     tables: dict[str, Any] = {}
     for key, value in given.items():
         try:
-            tables[key] = scene_value(value, METRICS) if key == "metrics" else scene_value(value)
+            tables[key] = (
+                to_scene_value(value, METRICS) if key == "metrics" else to_scene_value(value)
+            )
         except TypeError as error:
             raise SceneError([Problem("study", key, str(error))]) from None
     return tables
@@ -239,7 +241,7 @@ def _keywords_as_tables(given: Mapping[str, Any]) -> dict[str, Any]:
 def _split_changes(
     file: SceneFile, changes: Sequence[Change]
 ) -> tuple[SceneFile, list[tuple[str, str]], list[Change]]:
-    """Return a scene's tables as read, and its changes as swaps and then values.
+    """Return a scene's original tables, its type changes as (block, type), and other changes.
 
     Where that order would give another scene, the changed tables, and no changes.
     """
@@ -261,7 +263,7 @@ def _default_worker_count(study: Study, workers: int | None) -> int:
         isinstance(workers, int) and not isinstance(workers, bool) and 1 <= workers <= _MOST_WORKERS
     ):
         raise UsageError(f"workers is {workers!r}: it must be a whole number, 1 to {_MOST_WORKERS}")
-    strange = classes_in(
+    strange = class_texts_in(
         [
             study.base.data,
             [name for _, name in study.swaps],
@@ -312,7 +314,7 @@ def _run_into_folder(
 ) -> None:
     executor = make_executor("local", workers, None)
     try:
-        folder.open(description_text(study), resume=resume)
+        folder.open(study_json_text(study), resume=resume)
         run_study(study, folder, executor, progress or (lambda _: None))
     except Stopped as stop:
         if str(stop) == "interrupted":

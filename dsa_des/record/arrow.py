@@ -15,12 +15,12 @@ from dsa_des.arrays.column_values import (
     Schema,
     Text,
     instants_to_seconds,
-    is_empty,
-    null_column,
+    is_null_column,
+    null_float_column,
 )
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.message import rows_of
-from dsa_des.record.notes import Notes
+from dsa_des.block.message import slice_columns
+from dsa_des.record.table_metadata import Notes
 
 # A row group has at most so many rows and values: 2 MB of a table are all that waits to be written.
 # Groups of 8k rows of 25 columns are written as fast as of 64k, of 2k rows 1.4 times slower.
@@ -45,7 +45,7 @@ _TYPES = {
 
 
 def arrow_schema(schema: Schema) -> pa.Schema:
-    """Return the Arrow schema of recorded columns; whole numbers and flags are never null."""
+    """Return the Arrow schema of columns of given kinds; whole numbers and flags are not null."""
     return pa.schema([_arrow_field(name, kind, _TYPES[kind]) for name, kind in schema.items()])
 
 
@@ -65,7 +65,7 @@ def _arrow_array(values: Any, kind: str) -> pa.Array:
         return _dictionary_array(values.codes, values.names).cast(pa.string())
     values = instants_to_seconds(values)
     if kind == "float64":
-        if is_empty(values):
+        if is_null_column(values):
             return pa.nulls(len(values), _TYPES[kind])
         missing = np.isnan(values)
         count = np.count_nonzero(missing)
@@ -77,7 +77,7 @@ def _arrow_array(values: Any, kind: str) -> pa.Array:
 
 
 def _array_of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Array:
-    """Return an array of the same values, null where they are missing.
+    """Return an Arrow array of the same values, null where `missing` is True.
 
     ``pa.array`` imports pandas where that is installed, a fifth of a short run's time.
     """
@@ -99,11 +99,11 @@ def _dictionary_array(codes: AnyArray, names: tuple[str, ...]) -> pa.DictionaryA
 
 
 def _encode_by_appearance(text: Text) -> pa.DictionaryArray:
-    """Return a text column whose dictionary holds its own names only, as they first appear.
+    """Return text as an Arrow dictionary array; its dictionary has used names, first seen first.
 
     What the dictionary of a row group holds then follows from its rows alone.
     """
-    first = _first_rows(text.codes, len(text.names))
+    first = _first_row_of_each_code(text.codes, len(text.names))
     used = np.flatnonzero(first < len(text.codes))
     used = used[np.argsort(first[used])]
     names = tuple(text.names[i] for i in used.tolist())
@@ -114,8 +114,8 @@ def _encode_by_appearance(text: Text) -> pa.DictionaryArray:
     return _dictionary_array(code_of[text.codes], names)
 
 
-def _first_rows(codes: AnyArray, names: int) -> IntArray:
-    """Return the first row of each code; the number of codes for one that does not occur."""
+def _first_row_of_each_code(codes: AnyArray, names: int) -> IntArray:
+    """Return each code's first row index; the number of rows for a code that does not occur."""
     count = len(codes)
     if count and names <= _FEW_NAMES:
         hits_of = [codes == name for name in range(names)]
@@ -126,8 +126,8 @@ def _first_rows(codes: AnyArray, names: int) -> IntArray:
     return first[:-1]
 
 
-def rows_in_group(schema: Schema) -> int:
-    """Return how many rows of a table are a row group: a power of two, by its columns alone."""
+def rows_per_group(schema: Schema) -> int:
+    """Return the rows per Parquet row group: a power of two set by the number of columns only."""
     return min(ROW_GROUP, 1 << (_GROUP_VALUES // max(1, len(schema))).bit_length() - 1)
 
 
@@ -154,39 +154,39 @@ class ParquetSink:
                 _writer_schema(schema),
                 compression="lz4",
                 use_dictionary=text,
-                write_batch_size=rows_in_group(schema),
+                write_batch_size=rows_per_group(schema),
                 column_encoding=_ENCODINGS,
                 write_statistics=["tick"],
                 store_schema=False,
             )
             if self._notes is not None:
-                said = self._notes.of_file(table, arrow_schema(schema))
+                said = self._notes.parquet_metadata(table, arrow_schema(schema))
                 self._writers[table].add_key_value_metadata(said)
             self._pieces[table] = []
             self._counts[table] = 0
 
     def write(self, table: str, columns: Columns) -> None:
-        """Add rows; whole row groups go to the file."""
+        """Add rows to a table; row groups that are full are written to the file."""
         self._pieces[table].append(columns)
         self._counts[table] += len(columns["tick"])
-        if self._counts[table] >= rows_in_group(self._schemas[table]):
+        if self._counts[table] >= rows_per_group(self._schemas[table]):
             self._flush(table, whole=True)
 
     def _flush(self, table: str, *, whole: bool) -> None:
         pieces, count = self._pieces[table], self._counts[table]
         if not pieces:
             return
-        size = rows_in_group(self._schemas[table])
+        size = rows_per_group(self._schemas[table])
         full = count // size * size if whole else count
         columns = {name: _concatenate([piece[name] for piece in pieces]) for name in pieces[0]}
         for start in range(0, full, size):
             rows = slice(start, min(start + size, full))
-            self._writers[table].write_table(self._group(table, columns, rows))
+            self._writers[table].write_table(self._row_group_table(table, columns, rows))
         self._counts[table] = count - full
         rest = slice(full, count)
-        self._pieces[table] = [rows_of(columns, rest)] if full < count else []
+        self._pieces[table] = [slice_columns(columns, rest)] if full < count else []
 
-    def _group(self, table: str, columns: Columns, rows: slice) -> pa.Table:
+    def _row_group_table(self, table: str, columns: Columns, rows: slice) -> pa.Table:
         arrays = []
         for name, kind in self._schemas[table].items():
             values = columns[name]
@@ -198,13 +198,13 @@ class ParquetSink:
         return pa.Table.from_arrays(arrays, schema=_writer_schema(self._schemas[table]))
 
     def close(self) -> None:
-        """Write what is left and close the files."""
+        """Write the rows that are left and close the files."""
         for table, writer in self._writers.items():
             self._flush(table, whole=False)
             writer.close()
 
     def release(self) -> None:
-        """Let go of files that are still open, after a failure: what is in them is lost anyway.
+        """Close files still open after a failure, ignoring errors; their content is lost.
 
         A writer that could not write would try again when it is collected, and complain then.
         """
@@ -215,7 +215,7 @@ class ParquetSink:
 
 
 def _writer_schema(schema: Schema) -> pa.Schema:
-    """Return the schema as the writer is given it: text as codes, which files hold as text."""
+    """Return the Parquet writer's Arrow schema, with text columns dictionary-encoded."""
     text = pa.dictionary(pa.int32(), pa.string())
     return pa.schema(
         [_arrow_field(n, k, text if k == "text" else _TYPES[k]) for n, k in schema.items()]
@@ -225,8 +225,8 @@ def _writer_schema(schema: Schema) -> pa.Schema:
 def _concatenate(parts: list[Any]) -> Any:
     if len(parts) == 1:
         return parts[0]
-    if all(is_empty(part) for part in parts):
-        return null_column(sum(len(part) for part in parts))
+    if all(is_null_column(part) for part in parts):
+        return null_float_column(sum(len(part) for part in parts))
     if isinstance(parts[0], Text):
         # A recorder only ever adds names: the last piece knows them all.
         return Text(np.concatenate([part.codes for part in parts]), parts[-1].names)

@@ -56,7 +56,7 @@ def _save_picture(
     path: str | os.PathLike[str],
     other: Callable[[str], bytes] | None = None,
 ) -> None:
-    """Write a picture in the format that a file's name asks for."""
+    """Write a picture in the format that the ending of the file's name says."""
     kind = Path(path).suffix.lower().removeprefix(".")
     allowed = ["png", *(("svg", "pdf") if other is not None else ())]
     if kind not in allowed:
@@ -67,8 +67,8 @@ def _save_picture(
 
 
 @cache
-def _figure_class() -> Any:
-    """Return the class of figures: matplotlib's own, with its name and its PNG once it is drawn."""
+def _drawn_figure_class() -> Any:
+    """Return a subclass of matplotlib's figure that knows its name and, once drawn, its PNG."""
     import matplotlib
     from matplotlib.figure import Figure
 
@@ -99,7 +99,7 @@ _kept: ContextVar[dict[str, Any] | None] = ContextVar("kept figures", default=No
 
 @contextmanager
 def keep_figures() -> Iterator[dict[str, Any]]:
-    """Keep what is drawn into files inside of this: the file's stem → matplotlib figure."""
+    """Collect figures drawn to files in the context: yields file stem → matplotlib figure."""
     figures: dict[str, Any] = {}
     token = _kept.set(figures)
     try:
@@ -109,7 +109,7 @@ def keep_figures() -> Iterator[dict[str, Any]]:
 
 
 def pictures_in(folder: Path) -> dict[str, PictureFile]:
-    """Return the figures of a folder by name, in order of their names."""
+    """Return the PNG figures in a folder by name, sorted by name."""
     files = sorted(folder.glob("*.png"))
     return {file.stem: PictureFile(file.stem, file.read_bytes()) for file in files}
 
@@ -125,7 +125,7 @@ _MOST_LINES = 60
 def draw_to_png(
     width_in: float, height_in: float, path: Path | BinaryIO, dpi: int = DPI
 ) -> Iterator[Any]:
-    """Give an empty figure and write it as PNG, to a file or a stream, when the block is done.
+    """Yield an empty figure, and write it as PNG to a file or stream when the context ends.
 
     The file is there as a whole or not at all. Neither the user's matplotlibrc nor the date goes
     into it.
@@ -152,10 +152,10 @@ def draw_to_png(
                 "text.parse_math": False,  # a dollar sign in a name is a dollar sign
             }
         )
-        figure = _figure_class()(figsize=(width_in, height_in), dpi=dpi)
+        figure = _drawn_figure_class()(figsize=(width_in, height_in), dpi=dpi)
         canvas = FigureCanvasAgg(figure)
         yield figure
-        _make_plain(figure)
+        _shorten_and_escape_texts(figure)
         content = io.BytesIO()
         canvas.print_png(content, metadata={"Software": None}, pil_kwargs={"compress_level": 4})
         if isinstance(path, Path):
@@ -168,7 +168,7 @@ def draw_to_png(
 
 
 def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:
-    """Return a name fit for a figure: printable, cut where it is long, shown in a legend.
+    """Return a name as text for a figure: printable, short, and not hidden by legends.
 
     Matplotlib leaves legend entries out that begin with ``_``; a blank before it helps.
     """
@@ -176,8 +176,8 @@ def figure_text(name: object, most: int = MOST_OF_A_LABEL) -> str:
     return f" {text}" if text.startswith("_") else text
 
 
-def plain_log_ticks(axis: Any) -> None:
-    """Put plain numbers on a log axis of known limits: 1, 2 and 5 of each of its few decades."""
+def set_plain_log_ticks(axis: Any) -> None:
+    """Set a log axis's ticks to plain numbers, such as 1, 2, 5 per decade, not powers of ten."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
     low, high = axis.get_view_interval()
@@ -195,13 +195,13 @@ def _plain_number(value: float) -> str:
 
 
 def fit_axes_to_texts(figure: "Figure") -> None:
-    """Fit the axes of a figure to its texts, after these were made plain."""
-    _make_plain(figure)
+    """Shorten and escape all texts of a figure, then fit its axes to them."""
+    _shorten_and_escape_texts(figure)
     figure.tight_layout()
 
 
-def _make_plain(figure: "Figure") -> None:
-    """Cut and escape every text that was put into a figure, wherever it came from."""
+def _shorten_and_escape_texts(figure: "Figure") -> None:
+    """Shorten and escape all texts in a figure; show log axes' numbers without math notation."""
     from matplotlib.text import Text
     from matplotlib.ticker import LogFormatter, LogFormatterMathtext
 

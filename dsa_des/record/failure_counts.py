@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import is_single_run
+from dsa_des.arrays.run_ticks import is_shared_single_run
 from dsa_des.arrays.types import BoolArray, IntArray
 
 #: By block and by what its work lacked: how many times, of how many.
@@ -23,7 +23,7 @@ _LEAST_SHARE = 0.1
 
 
 def add_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tuple[int, int]]]:
-    """Return the counts of several runs as those of all of them, sorted."""
+    """Return the sum of runs' failure counts: block → what was missing → (failures, cases)."""
     result: dict[str, dict[str, tuple[int, int]]] = {}
     for part in parts:
         for block, counts in part.items():
@@ -38,13 +38,13 @@ def add_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tuple[int,
     }
 
 
-def count_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
-    """Return counts (2, runs) with more cases: the run of each that lacked something, and of all.
+def add_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
+    """Return counts (2, runs) of failures and cases, with new ones added by run number.
 
     The counts may end before the last run.
     """
     cases = lacking, every
-    if known.shape[1] < 2 and is_single_run(lacking) and is_single_run(every):
+    if known.shape[1] < 2 and is_shared_single_run(lacking) and is_shared_single_run(every):
         return known.sum(axis=1, keepdims=True) + np.array([[len(lacking)], [len(every)]])
     runs = max(known.shape[1], *(1 + int(run.max(initial=-1)) for run in cases))
     result = np.zeros((2, runs), dtype=np.int64)
@@ -56,7 +56,7 @@ def count_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray
 def counts_by_run(
     failures: Mapping[str, IntArray | tuple[int, int]], runs: int
 ) -> dict[str, IntArray]:
-    """Return a block's answer (`Component.failure_counts`) as counts of all runs."""
+    """Return a block's counts as what was missing → (2, runs): failures and cases by run."""
     result: dict[str, IntArray] = {}
     for what, counts in failures.items():
         said = np.asarray(counts, dtype=np.int64).reshape(2, -1)
@@ -65,8 +65,8 @@ def counts_by_run(
     return result
 
 
-def sum_runs(failures: FailuresByRun, runs: Collection[int] | slice) -> FailureCounts:
-    """Return the counts of some runs together."""
+def sum_counts_over_runs(failures: FailuresByRun, runs: Collection[int] | slice) -> FailureCounts:
+    """Return selected runs' failure counts summed: block → what was missing → (failures, cases)."""
     some = runs if isinstance(runs, slice) else list(runs)
     result: dict[str, dict[str, tuple[int, int]]] = {}
     for block, counts in failures.items():
@@ -78,7 +78,7 @@ def sum_runs(failures: FailuresByRun, runs: Collection[int] | slice) -> FailureC
 
 
 def failure_sentences(failures: FailureCounts) -> list[str]:
-    """Say what blocks could not do, with its share, where that is more than now and then."""
+    """Return a sentence per frequent failure: what a block could not do, how often, its share."""
     return [
         f"{block}: {what}: {times:,} of {of:,} ({_percent(times / of)})"
         for block, counts in failures.items()
@@ -89,19 +89,19 @@ def failure_sentences(failures: FailureCounts) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class Tries:
-    """What each run gave a block to work on, as a mask of sources, and whether it ever did it."""
+    """For each run, a block's sources (a bit mask), and whether it ever succeeded."""
 
     had: Any = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     did: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def add_tries(self, run: IntArray, had: Any, did: BoolArray) -> "Tries":
-        """Return them with masks of what some runs had, and whether it was done with them.
+        """Return the tries with cases added, given each one's run, source mask and success.
 
         The cases of each run stand together.
         """
         if not len(run):
             return self
-        known = self.had[0] if is_single_run(run) and self.did.all() and len(self.did) else 0
+        known = self.had[0] if is_shared_single_run(run) and self.did.all() and len(self.did) else 0
         if known and np.bitwise_or.reduce(had) | known == known:  # as most often
             return self
         first = np.flatnonzero(np.append(True, run[1:] != run[:-1]))
@@ -114,13 +114,15 @@ class Tries:
         return Tries(every, done)
 
     def failure_counts(self, what: str, *, of_two: bool = False) -> dict[str, IntArray]:
-        """Return in which runs it was never done, of those that had a source, or two."""
+        """Return `what` → counts (2, runs): 1 for each run that had a source (or two) but never
+        succeeded, and 1 for each run that had them.
+        """
         enough = has_two_bits(self.had) if of_two else self.had != 0
         return {what: np.array([enough & ~self.did, enough], dtype=np.int64)}
 
 
 def has_two_bits(mask: Any) -> BoolArray:
-    """Return which masks have more than one bit."""
+    """Return for each bit mask whether it has at least two bits set."""
     return np.asarray((mask & (mask - 1)) != 0, dtype=bool)
 
 

@@ -11,19 +11,19 @@ from dsa_des.arrays.column_values import (
     Schema,
     Text,
     constant_column,
-    holds_only,
-    is_constant,
-    is_empty,
-    null_column,
+    has_only_value,
+    is_null_column,
+    is_stored_once,
+    null_float_column,
 )
-from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
+from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.message import Message, rows_of
+from dsa_des.block.message import Message, slice_columns
 from dsa_des.block.recorded_columns import LEADING, PLATFORM
 from dsa_des.errors import nearest_name
 from dsa_des.record.sinks import Sink
 from dsa_des.record.text_codes import TextCodes
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 # Declared names that an error lists.
 _MOST_NAMES = 30
@@ -41,8 +41,8 @@ class DeclaredColumns:
         #: By block and table, the columns that are known to be declared.
         self._sound: dict[tuple[str, str], tuple[str, ...]] = {}
 
-    def check(self, block: str, table: str, columns: Iterable[str], message: str) -> None:
-        """Raise ValueError for what would be lost silently; the same columns again cost nothing."""
+    def check_declared(self, block: str, table: str, columns: Iterable[str], message: str) -> None:
+        """Raise ValueError for an undeclared table or column, or a table without ``tick``."""
         names = tuple(name for name in columns if name != "replica")
         if self._sound.get((block, table)) == names:
             return
@@ -66,7 +66,7 @@ class DeclaredColumns:
 
 
 def _suggest_declared(name: str, declared: Iterable[str]) -> str:
-    """Return the declared name nearest to one that is not, and what is declared."""
+    """Return text with the declared name closest to an undeclared one, and all declared ones."""
     names = sorted(declared)
     close = nearest_name(name, names)
     shown = ", ".join(names[:_MOST_NAMES]) + (", ..." if len(names) > _MOST_NAMES else "")
@@ -75,7 +75,7 @@ def _suggest_declared(name: str, declared: Iterable[str]) -> str:
 
 
 class _AlikeMessages(NamedTuple):
-    """Messages of one block that differ in nothing but their rows, and the tables they fill."""
+    """Messages of one block with one layout, so they can be joined, and the tables they fill."""
 
     block: str
     tables: frozenset[str]
@@ -98,7 +98,7 @@ class NotRecordedError(Exception):
 
 
 class Recorder:
-    """Gathers what blocks send and hands it on in canonical order.
+    """Collects what blocks record and passes the rows to its sinks, sorted by run and tick.
 
     `wanted` are the columns to record, by table, everything by default: what is not wanted costs
     nothing. `runs` is how many runs of the scene are recorded for the same purpose, here and
@@ -122,7 +122,8 @@ class Recorder:
         self._schemas: dict[str, Schema] = {}
         self._platforms: Mapping[str, str] = {}
         self._pending: dict[str, list[tuple[str, Columns]]] = {}
-        #: What came since `_build_pieces`, and of it what more messages of a block may join.
+        #: What came since `_join_recorded_messages`, and of it what more messages of a block may
+        # join.
         self._groups: list[_AlikeMessages] = []
         self._open: dict[str, list[_AlikeMessages]] = {}
         self._texts: dict[tuple[str, str], TextCodes] = {}
@@ -148,7 +149,7 @@ class Recorder:
         replicas: bool = False,
         platforms: Mapping[str, str] | None = None,
     ) -> None:
-        """Learn what the run's messages record; called once, before the run.
+        """Set up all tables and columns, and open the sinks; called once, before the run.
 
         With `replicas` every table begins with the number of the run; with `platforms` the platform
         of each row's block is a column. Rows of when a run has ended, as `ends` knows when they
@@ -181,14 +182,14 @@ class Recorder:
             sink.open(self._schemas)
 
     def record(self, block: str, message: Message) -> None:
-        """Note a message that `block` has sent; ValueError for a column that none declares."""
+        """Add a message sent by `block`; ValueError for an undeclared table or column."""
         for listener in self.listeners:
             listener(block, message)
         wanted = self._pending.keys()
         if self._wanted is not None and wanted.isdisjoint({*message.recorded, *message.may_hold}):
             return
         groups = self._open.get(block, [])
-        group = next((one for one in groups if one.messages[0].is_alike(message)), None)
+        group = next((one for one in groups if one.messages[0].has_same_layout(message)), None)
         if group is None:
             first = self._checked_tables(block, message)
             if not (tables := frozenset(table for table, _ in first)):
@@ -205,22 +206,22 @@ class Recorder:
         self._noted[1] += 1
 
     def _checked_tables(self, block: str, message: Message) -> list[tuple[str, Columns]]:
-        """Return the tables of a message, all of whose columns are declared."""
-        tables = list(self._tables(message))
+        """Return the tables of a message; raise ValueError if a table or column is not declared."""
+        tables = list(self._tables_with_run(message))
         for table, columns in tables:
-            self._declared.check(block, table, columns, type(message).__name__)
+            self._declared.check_declared(block, table, columns, type(message).__name__)
         return tables
 
-    def _build_pieces(self) -> None:
-        """Join recorded messages into a few long pieces of tables."""
+    def _join_recorded_messages(self) -> None:
+        """Join messages recorded so far into a few long pieces of each table, to be written."""
         groups, self._groups, self._open = self._groups, [], {}
         for block, _, messages, first in groups:
-            for table, columns in first or self._combined_tables(block, messages):
+            for table, columns in first or self._tables_of_messages(block, messages):
                 if table in self._pending and len(columns["tick"]):
                     self._pending[table].append((block, columns))
 
-    def _combined_tables(self, block: str, messages: list[Message]) -> list[tuple[str, Columns]]:
-        """Return the tables of several messages; names the one that fails."""
+    def _tables_of_messages(self, block: str, messages: list[Message]) -> list[tuple[str, Columns]]:
+        """Return messages' tables joined into one; NotRecordedError for a message that is wrong."""
         try:
             return self._checked_tables(block, type(messages[0]).concatenate(messages))
         except Exception:
@@ -231,13 +232,13 @@ class Recorder:
                     raise NotRecordedError(block, message.tick) from error
             raise
 
-    def _tables(self, message: Message) -> Iterator[tuple[str, Columns]]:
-        """Give the tables of a message; of one that does not say it there, run by run."""
+    def _tables_with_run(self, message: Message) -> Iterator[tuple[str, Columns]]:
+        """Yield a message's tables; in lock step with the run's number as column ``replica``."""
         tables = message.tables()
         if not self._replicas or all("replica" in columns for columns in tables.values()):
             yield from tables.items()
             return
-        firsts = message.instants.first_of_each.tolist()
+        firsts = message.instants.first_position_of_runs.tolist()
         for first, end in zip(firsts, [*firsts[1:], len(message)], strict=True):
             part = message.take(slice(first, end))
             for table, columns in part.tables().items():
@@ -245,26 +246,26 @@ class Recorder:
                 yield table, {**columns, "replica": run}
 
     def mark(self) -> int:
-        """Return how much was noted since the last `advance`, for `rewind`."""
+        """Return the number of message groups recorded so far, to which `rewind` can go back."""
         self._open = {}
         return len(self._groups)
 
     def rewind(self, mark: int) -> None:
-        """Forget what was noted since `mark`."""
+        """Drop everything recorded since `mark` was returned."""
         self._open = {}
         del self._groups[mark:]
 
-    def advance(self, run: int, tick: int) -> None:
-        """Pass on the rows before a tick of a run, once there are enough; no more will come."""
+    def flush_if_large(self, run: int, tick: int) -> None:
+        """Write rows before a run's given tick to the sinks, if enough; no earlier ones follow."""
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
             self._noted = [0, 0]
-            self._build_pieces()
+            self._join_recorded_messages()
             if tick > 0 or run > self._handed_on:  # else runs in lock step are all under way
                 self._flush_before(run, tick)
 
     def _flush_before(self, run: int, tick: int) -> None:
         self._handed_on = run
-        self._build_pieces()
+        self._join_recorded_messages()
         for table, pieces in self._pending.items():
             ready: list[tuple[str, Columns]] = []
             later: list[tuple[str, Columns]] = []
@@ -275,14 +276,14 @@ class Recorder:
                     ready.append((block, columns))
                     continue
                 if count:
-                    ready.append((block, rows_of(columns, slice(0, count))))
-                later.append((block, rows_of(columns, slice(count, len(instants)))))
+                    ready.append((block, slice_columns(columns, slice(0, count))))
+                later.append((block, slice_columns(columns, slice(count, len(instants)))))
             self._pending[table] = later
             if ready:
                 self._flush_table(table, ready)
 
     def close(self) -> None:
-        """Hand on everything that is left and close the sinks."""
+        """Write all rows that are left to the sinks, and close these."""
         self._flush_before(np.iinfo(np.int64).max - 1, 0)
         for sink in self.sinks:
             sink.close()
@@ -290,7 +291,7 @@ class Recorder:
     def _flush_table(self, table: str, pieces: list[tuple[str, Columns]]) -> None:
         pieces.sort(key=lambda piece: piece[0])
         instants = RunTicks.concatenate([_instants_of_columns(columns) for _, columns in pieces])
-        order = instants.order()
+        order = instants.sort_indices()
         if self._ends is not None and self._ends.early:
             kept = self._ends.is_before_ends(instants)
             order = np.flatnonzero(kept) if order is None else order[kept[order]]
@@ -299,14 +300,14 @@ class Recorder:
         if len(instants) == 0:
             return
         ordered = {
-            name: self._column(table, name, kind, pieces, order, instants)
+            name: self._joined_column(table, name, kind, pieces, order, instants)
             for name, kind in self._schemas[table].items()
         }
         self.rows[table] += len(instants)
         for sink in self.sinks:
             sink.write(table, ordered)
 
-    def _column(
+    def _joined_column(
         self,
         table: str,
         name: str,
@@ -315,7 +316,7 @@ class Recorder:
         order: IntArray | None,
         instants: RunTicks,
     ) -> Any:
-        """Return a column of all pieces in their order; `instants` are in it already."""
+        """Return a column of all pieces, joined and ordered; `instants` has that order already."""
         if name == "replica":
             return instants.run
         if name == "tick":
@@ -326,7 +327,9 @@ class Recorder:
             says: dict[str, Callable[[str], str | None]]
             says = {"block": str, PLATFORM: self._platforms.get}
             text = self._texts.setdefault((table, name), TextCodes(name, says.get(name)))
-            codes = _concatenate([text.codes(block, columns) for block, columns in pieces], order)
+            codes = _concatenate(
+                [text.translate_codes(block, columns) for block, columns in pieces], order
+            )
             return Text(codes, text.names)
         given: list[Any] = [columns.get(name) for _, columns in pieces]
         if all(isinstance(values, Instants) for values in given):
@@ -336,8 +339,8 @@ class Recorder:
             _column_values(self._to_seconds(values), kind, len(columns["tick"]))
             for values, (_, columns) in zip(given, pieces, strict=True)
         ]
-        if all(map(is_empty, parts)):
-            return null_column(len(instants))
+        if all(map(is_null_column, parts)):
+            return null_float_column(len(instants))
         return _concatenate(parts, order)
 
     def _to_seconds(self, values: Any) -> Any:
@@ -350,9 +353,9 @@ _LEAST_ROWS = 16
 
 
 def _concatenate(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
-    """Return the values of all parts in order; where all are the same, as one of them."""
+    """Return all parts' values joined and ordered; as one stored value if all are equal."""
     first, rows = parts[0][:1], sum(map(len, parts))
-    if rows >= _LEAST_ROWS * len(parts) and all(holds_only(part, first) for part in parts):
+    if rows >= _LEAST_ROWS * len(parts) and all(has_only_value(part, first) for part in parts):
         return constant_column(first[0], rows if order is None else len(order), first.dtype)
     values = np.concatenate(parts) if len(parts) > 1 else parts[0]
     return values if order is None else values.take(order)
@@ -361,14 +364,16 @@ def _concatenate(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
 def _instants_of_columns(columns: Columns) -> RunTicks:
     tick: Any = columns["tick"]
     run: Any = columns.get("replica")
-    return RunTicks(runs_of_single(len(tick)) if run is None else run, tick)
+    return RunTicks(single_run_numbers(len(tick)) if run is None else run, tick)
 
 
 def _column_values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
-        return null_column(count) if kind == "float64" else constant_column(0, count, kind)
+        return null_float_column(count) if kind == "float64" else constant_column(0, count, kind)
     values = np.asarray(values)
     # Whole numbers may be narrower: sinks widen them where they must be wide.
     if values.dtype == kind or (kind == "int64" and values.dtype.kind == "i"):
         return values
-    return constant_column(values[0], count, kind) if is_constant(values) else values.astype(kind)
+    return (
+        constant_column(values[0], count, kind) if is_stored_once(values) else values.astype(kind)
+    )

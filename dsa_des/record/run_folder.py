@@ -15,14 +15,14 @@ from typing import TYPE_CHECKING, Any
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_installed
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import RUN_JSON, add_file_list
 from dsa_des.files.output_names import new_folder_name
 from dsa_des.record.drawing import pictures_in
-from dsa_des.record.notes import OF_ROWS
-from dsa_des.terminal.terminal import html_of, text_of
+from dsa_des.record.table_metadata import OF_ROWS
+from dsa_des.terminal.terminal import capture_html, capture_text
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import printable, shorten
 
@@ -46,7 +46,7 @@ def write_json(path: Path, content: Any) -> None:
 
 
 def write_run_json(folder: Path, content: dict[str, Any]) -> None:
-    """Write ``run.json``, which lists the files of the folder: the last one to be written.
+    """Write ``run.json``, the last file, with a digest of every file in the folder.
 
     A folder whose files are not listed is not replaced by later results.
     """
@@ -55,7 +55,7 @@ def write_run_json(folder: Path, content: dict[str, Any]) -> None:
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """A run, kept in memory or read back from its folder.
+    """A finished run, kept in memory or read back from its folder.
 
     ``run["detections"]`` or ``run.detections`` is a ``pyarrow.Table``, with the columns of other
     tables that belong to its rows: those of ``scans`` that say where the ownship was.
@@ -110,22 +110,22 @@ class Run:
         return "\n".join([*lines, *(["  ..."] if len(tables) > _MOST_LINES else [])])
 
     def __str__(self) -> str:
-        return text_of(self._show)
+        return capture_text(self._print_to)
 
     def _repr_html_(self) -> str:
-        return html_of(self._show)
+        return capture_html(self._print_to)
 
-    def _show(self, console: Any) -> None:
-        """Print what the run is and came to, as ``dsa-des run`` does."""
+    def _print_to(self, console: Any) -> None:
+        """Print the run and each report of its summary to the console, as ``dsa-des run`` does."""
         from rich.text import Text
 
         console.print(Text(repr(self)))
         for point in entry_points_of(REPORTS).values():
-            load_installed(point)().show(console, self.summary)
+            load_unnamed_entry_point(point)().show(console, self.summary)
 
     @property
     def summary(self) -> dict[str, Any]:
-        """What the run came to, as ``dsa-des run --json`` prints it."""
+        """The results of the run as a dict, as ``dsa-des run --json`` prints them."""
         summary: dict[str, Any] = self.info.get("summary", {})
         return summary
 
@@ -135,7 +135,7 @@ class Run:
         return self.draw()
 
     def figure(self, name: str) -> Any:
-        """Return one of the figures that the reports draw, for example ``plan``.
+        """Return the figure of this name that the reports draw, for example ``plan``.
 
         It is a matplotlib figure with a method ``save(path)``; of a run that was read from a folder
         it is the PNG file there, with the same method.
@@ -152,7 +152,7 @@ class Run:
 
 
 def join_row_columns(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Table":
-    """Return a table with the columns of other tables that belong to its rows (`OF_ROWS`).
+    """Return a table with other tables' columns that belong to its rows (`OF_ROWS`).
 
     They are joined by block, tick and replica; where the table has such a column itself, what
     stands in it comes first.
@@ -179,7 +179,7 @@ def join_row_columns(tables: "Mapping[str, pa.Table]", name: str) -> "pa.Table":
 
 
 def _matching_rows(table: "pa.Table", other: "pa.Table") -> IntArray:
-    """Return the row of another table with the block, tick and replica of each row; -1 for none."""
+    """Return for each row of `table` the row of `other` of equal block, tick, replica; or -1."""
     import numpy as np
     import pyarrow as pa
 

@@ -23,7 +23,7 @@ def call_or_note(
     *arguments: Any,
     unless: type[Exception] = BrokenPipeError,
 ) -> Any:
-    """Return what a call gives; where it raises (but `unless`), add a note and return None."""
+    """Return a function's result; if it raises other than `unless`, note it and return None."""
     try:
         return call(*arguments)
     except unless:
@@ -44,13 +44,13 @@ class Sink(Protocol):
     """Something that takes recorded rows: a file, memory, or a running summary."""
 
     def open(self, schemas: Mapping[str, Schema]) -> None:
-        """Learn the tables and columns of the run."""
+        """Prepare for the tables of a run, given the kind of each of their columns."""
 
     def write(self, table: str, columns: Columns) -> None:
-        """Take rows of one table, in their final order."""
+        """Add rows to one table; they come in their final order."""
 
     def close(self) -> None:
-        """Finish: no more rows will follow."""
+        """Finish the output; no more rows will follow."""
 
 
 # Smaller pieces are kept as they come: to look at them costs more than they hold.
@@ -65,21 +65,23 @@ class _Keeping:
         self._parts: dict[str, list[Columns]] = {}
 
     def open(self, schemas: Mapping[str, Schema]) -> None:
-        """Learn the tables and columns of the run."""
+        """Prepare for the tables of a run, given the kind of each of their columns."""
         self._schemas = schemas
         self._parts = {table: [] for table in schemas}
 
     def write(self, table: str, columns: Columns) -> None:
-        """Keep rows of one table."""
+        """Store rows of one table in memory."""
         if len(next(iter(columns.values()), ())) >= _WORTH_PACKING:
-            columns = {name: self._pack(name, values) for name, values in columns.items()}
+            columns = {
+                name: self._shrink_or_share(name, values) for name, values in columns.items()
+            }
         self._parts[table].append(columns)
 
-    def _pack(self, name: str, values: Any) -> Any:
+    def _shrink_or_share(self, name: str, values: Any) -> Any:
         if isinstance(values, Text):
             return Text(_narrowest_type(values.codes), values.names)
         if isinstance(values, Instants):  # most often those of the rows
-            return Instants(self._pack("tick", values.ticks), values.ticks_per_s)
+            return Instants(self._shrink_or_share("tick", values.ticks), values.ticks_per_s)
         if values.dtype.kind == "i":
             values = _narrowest_type(values)
         if not values.strides[0]:
@@ -95,7 +97,7 @@ class _Keeping:
 
 
 def _narrowest_type(values: AnyArray) -> AnyArray:
-    """Return whole numbers in the narrowest type that holds them; constant ones as they are."""
+    """Return whole numbers in their smallest integer type; one stored value stays unchanged."""
     if not values.strides[0]:
         return values
     ends = np.array([values.min(), values.max()])
@@ -155,14 +157,14 @@ class Observer(Protocol):
     tables: ClassVar[frozenset[str]]
 
     def update(self, table: str, columns: Columns) -> None:
-        """Take rows of one of its `tables`."""
+        """Add rows of one of the tables that this observer reads."""
 
     def result(self) -> dict[str, Any]:
         """Return sections of the run's summary."""
 
 
 def _observer_column(values: Any) -> Any:
-    """Return a column as observers read it: instants in seconds, whole numbers of 64 bits."""
+    """Return an observer column: instants as seconds, integers as int64, others unchanged."""
     if isinstance(values, Text):
         return values
     values = instants_to_seconds(values)
@@ -189,7 +191,7 @@ class ObserverSink:
         if asked:
             columns = {name: _observer_column(values) for name, values in columns.items()}
         for observer in asked:
-            self._ask(observer, observer.update, table, columns)
+            self._call_observer(observer, observer.update, table, columns)
 
     def close(self) -> None:
         """Nothing to do."""
@@ -198,10 +200,10 @@ class ObserverSink:
         """Return the sections of all observers."""
         sections: dict[str, Any] = {}
         for observer in list(self.observers):
-            sections.update(self._ask(observer, observer.result) or {})
+            sections.update(self._call_observer(observer, observer.result) or {})
         return sections
 
-    def _ask(self, observer: Observer, call: Callable[..., Any], *arguments: Any) -> Any:
+    def _call_observer(self, observer: Observer, call: Callable[..., Any], *arguments: Any) -> Any:
         if self._notes is None:
             return call(*arguments)
         count = len(self._notes)

@@ -9,7 +9,7 @@ from dsa_des.arrays.types import AnyArray
 
 
 class TextCodes:
-    """The names that a text column has held so far, and what its pieces' own codes become."""
+    """All names a text column has had, with translations of each piece's codes into theirs."""
 
     def __init__(self, column: str, of_block: Callable[[str], str | None] | None) -> None:
         #: Of each block what its rows hold; None of columns that messages fill.
@@ -19,21 +19,23 @@ class TextCodes:
         self._lookups: dict[int, tuple[tuple[str, ...], AnyArray]] = {}
         self.names: tuple[str, ...] = ()
 
-    def codes(self, block: str, columns: Columns) -> AnyArray:
-        """Return one piece's codes into our names; -1 is null."""
+    def translate_codes(self, block: str, columns: Columns) -> AnyArray:
+        """Return the codes of one piece's text column as codes into `names`; -1 is null."""
         count = len(columns["tick"])
         if self._of_block is not None:
             name = self._of_block(block)
-            code = -1 if name is None else self._codes_of((name,))[0]
+            code = -1 if name is None else self._code_lookup((name,))[0]
             return constant_column(code, count, "int32")
         text = columns.get(self._column)
         if text is None:
             return constant_column(-1, count, "int32")
         if not isinstance(text, Text):
             raise TypeError(f"column {self._column!r} must be Text")
-        return self._codes_of(text.names).take(text.codes, mode="wrap")  # -1 takes the last entry
+        return self._code_lookup(text.names).take(
+            text.codes, mode="wrap"
+        )  # -1 takes the last entry
 
-    def _codes_of(self, names: tuple[str, ...]) -> AnyArray:
+    def _code_lookup(self, names: tuple[str, ...]) -> AnyArray:
         known = self._lookups.get(id(names))
         if known is not None and known[0] is names:
             return known[1]

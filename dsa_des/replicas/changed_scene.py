@@ -15,7 +15,7 @@ from pydantic import BaseModel, ValidationError
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.block_table import Block, BlockOptions
 from dsa_des.scene.changes import Stretch, common_ticks_per_s
-from dsa_des.scene.checks import check_times, read_clocks
+from dsa_des.scene.checks import checked_ticks_per_s, read_clocks
 from dsa_des.scene.keys import explain_no_item, item_index, unquote_key
 from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
@@ -37,7 +37,7 @@ class Replica:
 
 
 def replica_scene(scene: Scene, replica: Replica) -> Scene:
-    """Return the scene of one replica.
+    """Return the scene with the seed and the changes of one replica.
 
     A `SceneError` says which change names nothing in the scene, or is not allowed.
     """
@@ -55,7 +55,7 @@ def replica_scene(scene: Scene, replica: Replica) -> Scene:
     if wires is not scene.wires or duration is not scene.duration_s or _times_differ(scene, blocks):
         file = SceneFile(scene.path, {})
         clocks = read_clocks(file, blocks)
-        ticks_per_s = check_times(file, blocks, clocks, wires, duration)
+        ticks_per_s = checked_ticks_per_s(file, blocks, clocks, wires, duration)
         file.refuse()
     made = replace(
         scene,
@@ -75,7 +75,7 @@ def replica_scene(scene: Scene, replica: Replica) -> Scene:
 
 
 def _replica_stretch(stretch: Stretch, replica: Replica) -> Stretch:
-    """Return a stretch as a replica has it: what the scene changes then, the replica does not."""
+    """Return a stretch with a replica's changes, except to keys that the stretch changes."""
     fixed = [key_path(key) for key in stretch.keys]
     mine = {
         key: value
@@ -89,7 +89,7 @@ _Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
 
 
 def _change_all(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
-    """Return blocks, sections and duration with all changes made at once, each table checked once.
+    """Return (blocks, sections, duration) with all changes made at once, tables validated once.
 
     Raises whatever is wrong with any change.
     """
@@ -126,7 +126,7 @@ _THE_SAME = {
 def _change_one_by_one(
     scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]
 ) -> _Changed:
-    """Make one change after the other; `SceneError` says what is wrong with each."""
+    """Return (blocks, sections, duration) after changes one by one; `SceneError` names faults."""
     problems: list[Problem] = []
     blocks, sections, duration = dict(scene.blocks), dict(scene.sections), scene.duration_s
     for key, value in changes.items():
@@ -156,7 +156,7 @@ def _change_one_by_one(
 
 
 def _times_differ(scene: Scene, blocks: Mapping[str, Block]) -> bool:
-    """Return whether exact times of any block are others than those of the scene."""
+    """Return whether a clock or other exact time of any block differs from the scene's."""
     for name, block in scene.blocks.items():
         one, other = block.parameters, blocks[name].parameters
         if one is other:
@@ -249,7 +249,7 @@ def _replace_values(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> A
 
 
 def find_item(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:
-    """Return which item the head of a path means, by number or name, and the tail of the path.
+    """Return the item's index that a path's start names (number or name), and the path's rest.
 
     Names may hold the dots at which the path was split.
     """

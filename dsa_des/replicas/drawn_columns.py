@@ -36,7 +36,7 @@ Path = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class DrawnColumn:
-    """The values of one drawn key, one for each replica, as the field holds them.
+    """The values of one drawn key in all replicas, of the type that its field holds.
 
     The path is where it stands in the block's parameters: names of fields, and numbers of items.
     """
@@ -47,7 +47,7 @@ class DrawnColumn:
 
 
 class ReplicaScenes(Sequence[Scene]):
-    """The scenes of replicas that differ in seeds and columns only; one is made when asked for.
+    """Scenes of replicas that differ in seeds and drawn values only; each is made when read.
 
     What columns hold counts instead of what `scene`, a checked one of them, says there.
     """
@@ -76,13 +76,13 @@ class ReplicaScenes(Sequence[Scene]):
         return replace(self._scene, seed=self.seeds[index], blocks=blocks)
 
     def parameters_of(self, block: str) -> list[Any]:
-        """Return a block's parameters in every replica."""
+        """Return a list of a block's parameters in each replica."""
         if not any(column.block == block for column in self._drawn):
             return [self._scene.blocks[block].parameters] * len(self)
         return [self._parameters_of(block, number) for number in range(len(self))]
 
     def differing_parameters(self, block: str) -> set[str]:
-        """Return which of a block's parameters are not the same in all replicas."""
+        """Return the names of a block's parameters that differ between replicas."""
         return {
             str(column.path[0])
             for column in self._drawn
@@ -91,22 +91,22 @@ class ReplicaScenes(Sequence[Scene]):
 
     def _parameters_of(self, block: str, number: int) -> Any:
         changes = {c.path: c.values[number] for c in self._drawn if c.block == block}
-        return _replace_values(self._scene.blocks[block].parameters, changes)
+        return _replace_checked_values(self._scene.blocks[block].parameters, changes)
 
 
-def _replace_values(old: Any, changes: Mapping[Path, Any]) -> Any:
-    """Return a table with values in it that are known to be allowed."""
+def _replace_checked_values(old: Any, changes: Mapping[Path, Any]) -> Any:
+    """Return a copy of a table with values at some paths replaced, without validation."""
     parts: dict[Any, dict[Path, Any]] = {}
     for path, value in changes.items():
         parts.setdefault(path[0], {})[path[1:]] = value
     if not isinstance(old, BaseModel):
         items = list(old)
         for index, mine in parts.items():
-            items[index] = mine[()] if () in mine else _replace_values(items[index], mine)
+            items[index] = mine[()] if () in mine else _replace_checked_values(items[index], mine)
         return type(old)(items)
     fields = {name: old.__dict__[name] for name in _fields_of(type(old))}
     for name, mine in parts.items():
-        fields[name] = mine[()] if () in mine else _replace_values(fields[name], mine)
+        fields[name] = mine[()] if () in mine else _replace_checked_values(fields[name], mine)
     return _make_model(type(old), fields, set(old.model_fields_set))
 
 
@@ -124,8 +124,9 @@ def _make_model(model: type[BaseModel], fields: dict[str, Any], given: set[str])
     return new
 
 
-def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | None:
-    """Return the scenes of replicas, checked as columns; None where that cannot be done.
+def scenes_from_drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | None:
+    """Return the scenes of replicas that differ only in seeds and drawn values, each drawn key
+    validated as one column; None where that is not possible.
 
     Then every one has to be made and checked by itself (`replica_scene`), which also says what is
     wrong.
@@ -142,20 +143,22 @@ def drawn_columns(scene: Scene, replicas: Sequence[Replica]) -> ReplicaScenes | 
         seeds = [replica.seed for replica in replicas]
         probes = [{key: pick(c.values) for key, c in columns.items()} for pick in _PROBES]
         made = [replica_scene(scene, Replica(seeds[0], probe)) for probe in probes]
-        return ReplicaScenes(made[0], seeds, _watch_columns(made[0], list(columns.values())))
+        return ReplicaScenes(
+            made[0], seeds, _check_drawn_fields_unread(made[0], list(columns.values()))
+        )
     except (_NoColumn, SceneError):
         return None
 
 
 def replica_scenes(scene: Scene, replicas: Sequence[Replica]) -> Sequence[Scene]:
-    """Return the scene of every replica.
+    """Return the scenes of all replicas, in order.
 
     Raises
     ------
     SceneError
         As `replica_scene`, for the first replica with something wrong.
     """
-    together = drawn_columns(scene, replicas)
+    together = scenes_from_drawn_columns(scene, replicas)
     return [replica_scene(scene, replica) for replica in replicas] if together is None else together
 
 
@@ -170,7 +173,7 @@ class _NoColumn(Exception):
 
 
 def _checked_column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColumn:
-    """Return the column of a key, its values as its field would hold them."""
+    """Return a drawn key's values as its field holds them; `_NoColumn` if not possible."""
     path = key_path(key)
     if len(path) < 3 or path[0] != "blocks" or path[1] not in scene.blocks:
         raise _NoColumn
@@ -182,7 +185,7 @@ def _checked_column(scene: Scene, key: str, values: Sequence[Any]) -> DrawnColum
 
 
 def _locate_field(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], str]:
-    """Return a path with items by number, and the field at its end."""
+    """Return a field's path with list items by number, its model, and its name."""
     found: list[str | int] = []
     old: Any = parameters
     while path:
@@ -207,7 +210,7 @@ def _locate_field(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], s
 
 
 def _can_check_columns(model: type[BaseModel]) -> bool:
-    """Whether a model's values are checked by their own fields and by validators of the whole."""
+    """Return whether no validator of the model bars checking a field's values as a column."""
     known = model.__pydantic_decorators__
     alien = (
         model.__init__ is not BaseModel.__init__
@@ -232,18 +235,20 @@ def _can_check_columns(model: type[BaseModel]) -> bool:
 
 
 def _declared_names(cls: type, known: type = BaseModel) -> set[str]:
-    """Return what a class and its bases say themselves, up to one that is known."""
+    """Return all attribute names that a class and its bases define, up to the base `known`."""
     bases = cls.__mro__[: cls.__mro__.index(known)] if known in cls.__mro__ else cls.__mro__
     return {name for base in bases for name in vars(base)}
 
 
 def _is_common_validator(function: Any) -> bool:
-    """Return whether it is the validator of extreme numbers that every `Parameters` has."""
+    """Return whether a function is the extreme-number validator of all `Parameters` classes."""
     return getattr(function, "__func__", None) is Parameters._computable.__func__  # type: ignore[attr-defined]
 
 
 def _validate_values(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
-    """Return values of a field that has bounds and nothing else, as it holds them."""
+    """Return the values as the field holds them, after a check of their types; raise `_NoColumn` if
+    the field has more than bounds.
+    """
     field = model.model_fields[name]
     union = get_origin(field.annotation) in (Union, UnionType)
     options = get_args(field.annotation) if union else (field.annotation,)
@@ -272,8 +277,11 @@ def _validate_values(model: type[BaseModel], name: str, values: Sequence[Any]) -
     return held
 
 
-def _watch_columns(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[DrawnColumn]:
-    """Return the columns if no validator reads what is drawn, and clocks read offsets only.
+def _check_drawn_fields_unread(
+    scene: Scene, columns: Sequence[DrawnColumn]
+) -> Sequence[DrawnColumn]:
+    """Return the columns unchanged if no validator reads the drawn fields and clocks read at most
+    their offset; raise `_NoColumn` otherwise.
 
     Ticks of a second and times that they can hold are then those of the replicas that were checked.
     """
@@ -282,7 +290,9 @@ def _watch_columns(scene: Scene, columns: Sequence[DrawnColumn]) -> Sequence[Dra
         block = scene.blocks[name]
         try:
             with _track_reads() as read:
-                parameters = _validate_watched(block.parameters, [column.path for column in mine])
+                parameters = _validate_and_note_reads(
+                    block.parameters, [column.path for column in mine]
+                )
                 if read:
                     raise _NoColumn
                 block.cls.clock_of(parameters)
@@ -304,20 +314,20 @@ def _clock_offsets(column: DrawnColumn) -> Sequence[Fraction]:
     return column.values if column.path == ("offset_s",) else ()
 
 
-def _validate_watched(old: Any, paths: Sequence[Path]) -> Any:
-    """Validate a table again, with tables in it that note what is read of the values at paths."""
+def _validate_and_note_reads(old: Any, paths: Sequence[Path]) -> Any:
+    """Validate a table again with classes that note each read of the fields at the given paths."""
     parts: dict[Any, list[Path]] = {}
     for path in paths:
         parts.setdefault(path[0], []).append(path[1:])
     if not isinstance(old, BaseModel):
         items = list(old)
         for index, mine in parts.items():
-            items[index] = _validate_watched(items[index], mine)
+            items[index] = _validate_and_note_reads(items[index], mine)
         return items
     given = {name: getattr(old, name) for name in old.model_fields_set | parts.keys()}
     for name, mine in parts.items():
         if mine != [()]:
-            given[name] = _validate_watched(given[name], mine)
+            given[name] = _validate_and_note_reads(given[name], mine)
     drawn = frozenset(name for name, mine in parts.items() if mine == [()])
     return _watched_type(type(old), drawn).model_validate(given)
 
@@ -331,7 +341,7 @@ _ALL_FIELDS = frozenset(dir(BaseModel)) - _HARMLESS - {"model_fields", "model_fi
 
 @contextmanager
 def _track_reads() -> Iterator[set[str]]:
-    """Give the names that are read meanwhile of what `_watched_type` makes."""
+    """Yield a set to which the names of watched fields are added when read in the context."""
     _noted.append(set())
     try:
         yield _noted[-1]
@@ -341,7 +351,7 @@ def _track_reads() -> Iterator[set[str]]:
 
 @lru_cache(maxsize=256)
 def _watched_type(model: type[BaseModel], fields: frozenset[str]) -> type[BaseModel]:
-    """Return a model like another one that notes when one of some fields is read.
+    """Return a subclass of a model that notes when one of the given fields is read.
 
     It is validated as the other one is; to look at all fields at once is to read them too.
     """

@@ -24,14 +24,14 @@ _A_LONG_RUN_S = 3600.0
 
 @dataclass(frozen=True)
 class RunSize:
-    """Bytes that a run holds while it lasts, and that are recorded of it."""
+    """How many bytes a run needs while it lasts, and how many are recorded of it."""
 
     held: float
     recorded: float = 0.0
 
     @classmethod
-    def of(cls, scene: Scene, wanted: Mapping[str, Collection[str]]) -> "RunSize":
-        """Return the likely size of a run of a scene of which some columns are recorded.
+    def estimate(cls, scene: Scene, wanted: Mapping[str, Collection[str]]) -> "RunSize":
+        """Return the estimated size of the scene's run, recording the `wanted` columns.
 
         Of these there is hardly more than a row of every target at every scan, or one of them all
         where a table has no targets. What is wrong with the scene is raised.
@@ -39,7 +39,7 @@ class RunSize:
         simulation = Simulation(scene)
         components = simulation.components.values()
         targets = max(1, *(component.width for component in components))
-        held = _held_bytes(float(simulation.duration_s), simulation.scans, 1 + targets)
+        held = _estimate_held_bytes(float(simulation.duration_s), simulation.scans, 1 + targets)
         sent = [output.message for of in components for output in of.outputs.values()]
         of_no_target = {message.row_table for message in sent}
         columns = sum(
@@ -48,19 +48,19 @@ class RunSize:
         return cls(held, 8.0 * columns * simulation.scans)
 
     @property
-    def most(self) -> int:
-        """How many such runs a lock step holds."""
+    def largest_run_count(self) -> int:
+        """The number of such runs that fit into memory in one lock-step simulation."""
         return max(1, int(MOST_BYTES / max(self.held, _COPIES * self.recorded)))
 
 
-def are_few(scene: Scene, runs: int) -> bool:
-    """Return whether so many runs go together however many aircraft there are, up to a hundred."""
+def surely_fit_in_memory(scene: Scene, runs: int) -> bool:
+    """Return whether so many runs surely fit into memory: at most a hundred short ones."""
     specs = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
     per_s = float(sum(spec.rate_hz for spec in specs if spec is not None))
     duration_s = float(scene.duration_s or _A_LONG_RUN_S)
-    held = runs * _held_bytes(duration_s, per_s * duration_s, 2)
+    held = runs * _estimate_held_bytes(duration_s, per_s * duration_s, 2)
     return runs <= FEW and held <= _SMALL_SHARE * MOST_BYTES
 
 
-def _held_bytes(duration_s: float, scans: float, aircraft: int) -> float:
+def _estimate_held_bytes(duration_s: float, scans: float, aircraft: int) -> float:
     return aircraft * (_BYTES + _BYTES_PER_S * duration_s + _BYTES_PER_SCAN * scans)

@@ -21,7 +21,7 @@ from dsa_des.replicas.drawn_columns import ReplicaScenes
 from dsa_des.replicas.split_block import NotInLockStep, SplitBlock
 from dsa_des.running.effects import build_effects
 from dsa_des.running.grain import Grain
-from dsa_des.running.loops import edges_opening_loops
+from dsa_des.running.loops import longest_delay_cut_edges
 from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Windows
@@ -49,7 +49,7 @@ def make_lockstep_simulation(
     report: TakeReport | None = None,
     window: int | None = None,
 ) -> Simulation:
-    """Return replicas of a scene made ready to run together, once.
+    """Return one simulation of all replicas of a scene in lock step; it can be run once.
 
     The `scenes` have the same graph and block types, and other seeds or parameters. Every table of
     the recorder begins with the column ``replica``. `report` is called with a replica's number and
@@ -62,7 +62,7 @@ def make_lockstep_simulation(
 
 
 class Replicas(Timeline):
-    """Runs of a scene that share blocks; as for `make_lockstep_simulation`."""
+    """A lock-step simulation's timeline: replicas that share blocks' instances where they can."""
 
     says_replica = True
 
@@ -82,23 +82,25 @@ class Replicas(Timeline):
         self.streams = Streams(self.seeds)
 
     def set_length(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
-        """Split the blocks that cannot serve all runs."""
+        """Set the duration; make an instance per replica, or a joint one, of unshared blocks."""
         super().set_length(components, duration_s)
         self._faces = components
         for name, component in components.items():
             if self._is_shared(name, component):
-                self.streams.share(name)
+                self.streams.forbid_draws_for_all(name)
             else:
                 if component.process is not None:
                     raise NotInLockStep(f"block {name} has a process of its own")
-                make = self._maker(name, component)
+                make = self._instance_maker(name, component)
                 if (runner := self._combined_component(name, component)) is not None:
                     self.together[name] = runner
                     continue
-                self.split[name] = SplitBlock(tuple(component.outputs), make, self._finish)
+                self.split[name] = SplitBlock(
+                    tuple(component.outputs), make, self._collect_finished_instance
+                )
 
     def _is_shared(self, name: str, component: Component) -> bool:
-        """Whether one instance serves all replicas."""
+        """Return whether replicas can share an instance: parameters equal, apart from clocks."""
         # What was drawn when it was set up would be the first one's in all of them.
         if not component.serves_replicas() or self.streams.has_drawn_for_all(name):
             return False
@@ -108,7 +110,7 @@ class Replicas(Timeline):
         return not differing
 
     def _differing_parameters(self, name: str) -> set[str]:
-        """Return which of a block's parameters are not the same in all replicas."""
+        """Return the names of a block's parameters that differ between replicas."""
         if isinstance(self._scenes, ReplicaScenes):
             return self._scenes.differing_parameters(name)
         first = self._scenes[0].blocks[name].parameters
@@ -122,7 +124,7 @@ class Replicas(Timeline):
         return names
 
     def _combined_component(self, name: str, face: Component) -> Component | None:
-        """Return what runs a block for all replicas though they differ, if it offers that."""
+        """Return one component for all replicas of differing parameters; None if there is none."""
 
         def make(number: int) -> Component:
             component = self._make_component(name, number)
@@ -156,19 +158,19 @@ class Replicas(Timeline):
         block = scene.blocks[name]
         return block.cls(name, block.parameters, context)
 
-    def _maker(self, name: str, face: Component) -> Callable[[int], Component]:
+    def _instance_maker(self, name: str, face: Component) -> Callable[[int], Component]:
         def make(number: int) -> Component:
             scene, component = self._scenes[number], self._make_component(name, number)
             self._check_same_length(face, component)
             build_effects(component, scene.tolerance)
             component.setup()
-            self._check_same_word(face, component)
+            self._check_same_connections(face, component)
             return component
 
         return make
 
-    def _check_same_word(self, face: Component, component: Component) -> None:
-        """Refuse an instance that asks, offers or records something else than the first."""
+    def _check_same_connections(self, face: Component, component: Component) -> None:
+        """Raise NotInLockStep if an instance records, requests or offers other than the first."""
         if [*component.records()] != [*face.records()]:
             raise NotInLockStep(f"block {face.name} records something else in some replica")
         for port in face.inputs:
@@ -182,14 +184,14 @@ class Replicas(Timeline):
                 )
 
     def _check_same_length(self, face: Component, component: Component) -> None:
-        """Refuse an instance by whose data its replica would last longer or shorter."""
+        """Raise NotInLockStep if an instance sets another duration than the first one does."""
         if self.scene.duration_s is not None:
             return
         if component.natural_duration_s() != face.natural_duration_s():
             raise NotInLockStep(f"block {face.name} gives some replica another duration")
 
     def rehearse(self) -> None:
-        """Build each replica's own instances once, to raise their errors, and drop them.
+        """Set up each replica's own instances once to raise their errors, and discard them.
 
         `NotInLockStep` if that shows a reason not to run them together.
         """
@@ -198,11 +200,11 @@ class Replicas(Timeline):
                 block.make(number)
 
     def failure_counts(self, components: Mapping[str, Component]) -> FailuresByRun:
-        """Return what blocks could not do in each run: of those that are split, by instance."""
+        """Return failure counts of blocks in each run, of shared and of single instances."""
         shared = {n: c for n, c in components.items() if n not in self.split}
         return {**super().failure_counts(shared), **self._failures}
 
-    def _finish(self, number: int, component: Component) -> None:
+    def _collect_finished_instance(self, number: int, component: Component) -> None:
         of_all = self._failures.setdefault(component.name, {})
         for what, counts in counts_by_run(component.failure_counts(), 1).items():
             of_all.setdefault(what, np.zeros((2, self.count), dtype=np.int64))
@@ -214,7 +216,7 @@ class Replicas(Timeline):
             self._report(number, component.report())
 
     def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
-        """Return the instances of a block that changes, each of which serves all replicas."""
+        """Return a changing block's instances by stretch; NotInLockStep if these cannot serve."""
         stretched, name = super().stretched(instances), instances[0].name
         if stretched is not None and not all(self._is_shared(name, one) for one in instances):
             raise NotInLockStep(f"block {name} changes while it runs, and cannot be shared")
@@ -241,7 +243,7 @@ class Replicas(Timeline):
         return specs
 
     def runner(self, component: Component) -> Any:
-        """Return the block, or its instances."""
+        """Return what runs a block: itself, a component for all, or an instance per replica."""
         together = self.together.get(component.name)
         return self.split.get(component.name, component) if together is None else together
 
@@ -252,7 +254,7 @@ class Replicas(Timeline):
         horizon_ticks: int | None,
         rewinder: Rewinder | None,
     ) -> Windows:
-        """Return windows that hold many whole replicas, or in loops stretches of all of them."""
+        """Return the time windows blocks run in; NotInLockStep if loops need too many."""
         most = _MOST_WINDOWS_PER_SCAN * scans + 1000
         if horizon_ticks is not None and self.runs.run_ticks > horizon_ticks * most:
             said = f"{horizon_ticks / self.scene.ticks_per_s:.2g} s"
@@ -260,18 +262,18 @@ class Replicas(Timeline):
         return super().windows(longest_ticks, scans, horizon_ticks, rewinder)
 
     def grain(self, window: int | None) -> Grain:
-        """Return the grain: all run in windows, in loops in those that nothing comes back in."""
-        return Grain(set(self.scene.blocks), False, edges_opening_loops(self.scene), {})
+        """Return how blocks run: in windows, loops opened where nothing returns within one."""
+        return Grain(set(self.scene.blocks), False, longest_delay_cut_edges(self.scene), {})
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
-        """Let instances report; a shared block has seen the rows of all and speaks for none."""
+        """Collect reports of blocks with instances per replica, and close these; shared: none."""
         for block in self.split.values():
-            block.close(len(self._scenes))
+            block.close_instances(len(self._scenes))
         if self._report is not None:
             for name in self.together:
-                make = self._maker(name, components[name])
+                make = self._instance_maker(name, components[name])
                 for number in range(len(self._scenes)):
-                    self._finish(number, make(number))
+                    self._collect_finished_instance(number, make(number))
         return {}
 
 
@@ -282,7 +284,7 @@ def _seeds_of(scenes: Sequence[Scene]) -> Sequence[int]:
 
 
 def _check_alike(scenes: Sequence[Scene]) -> None:
-    """Refuse scenes that differ in more than seeds and parameters of blocks."""
+    """Raise NotInLockStep if the scenes differ in more than seeds and parameters of blocks."""
     first = scenes[0]
     late = sorted(n for n, cls in first.classes.items() if not cls.windowed or cls.process)
     if late:
@@ -307,7 +309,7 @@ def _check_alike(scenes: Sequence[Scene]) -> None:
 
 
 def _have_same_changes(scene: Scene, first: Scene) -> bool:
-    """Return whether the same blocks change at the same instants, and are then the same."""
+    """Return whether two scenes' stretches begin together and changing blocks' parameters agree."""
     if [one.from_s for one in scene.stretches] != [one.from_s for one in first.stretches]:
         return False
     pairs = [(a.scene, b.scene) for a, b in zip(scene.stretches, first.stretches, strict=True)]
@@ -324,7 +326,7 @@ def _have_same_changes(scene: Scene, first: Scene) -> bool:
 
 
 def _parameters_without_clock(block: Block) -> dict[str, Any]:
-    """Return a block's parameters without what only the engine reads of its clock."""
+    """Return a block's parameters by name, without those only read for its clock."""
     clocked = isinstance(block.parameters, ClockedParameters)
     values = dict(block.parameters)
     return {n: v for n, v in values.items() if not clocked or n not in _OF_THE_CLOCK}

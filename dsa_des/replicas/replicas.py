@@ -7,14 +7,19 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.block.message import Columns, rows_of
+from dsa_des.block.message import Columns, slice_columns
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, add_counts, sum_runs
+from dsa_des.record.failure_counts import (
+    FailureCounts,
+    FailuresByRun,
+    add_counts,
+    sum_counts_over_runs,
+)
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.replicas.drawn_columns import drawn_columns, replica_scenes
-from dsa_des.replicas.lock_step_size import RunSize, are_few
+from dsa_des.replicas.drawn_columns import replica_scenes, scenes_from_drawn_columns
+from dsa_des.replicas.lock_step_size import RunSize, surely_fit_in_memory
 from dsa_des.replicas.lockstep import NotInLockStep, Replicas, make_lockstep_simulation
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -34,7 +39,7 @@ class Shared:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a run recorded: by table, columns as blocks sent them and in recorded order.
+    """What one run recorded: its tables, its duration and how often blocks failed.
 
     `report` returns the sections that blocks add to the summary; `ended_early` says whether a block
     ended the run before its time; `shared` is the recording of which the tables of this `number`
@@ -66,28 +71,28 @@ def run_replicas(
     runs: int | None = None,
     most: int | None = None,
 ) -> list[Recorded | Failed]:
-    """Run replicas of a scene, in lock step where they can; a failing one stops no other.
+    """Run replicas, in lock step if possible; return recordings or failures that stop no other.
 
     `wanted` columns are recorded, by default all; `runs` is how many there are of the scene, where
     these are some of them. At most so many as `most` run together, by default those that memory
     holds. What is returned is in the order of `replicas`, and each is identical to
     a run of its own.
     """
-    failed, scenes = _check_replicas(scene, replicas)
+    failed, scenes = _make_replica_scenes(scene, replicas)
     ran: list[Recorded | Failed] = []
     runs = len(replicas) if runs is None else runs
-    for part in _split(scenes, wanted, most):
+    for part in _split_by_memory(scenes, wanted, most):
         together: Sequence[Recorded | Failed] | None = _run_together(part, wanted, runs)
         ran += together or [_run_alone(one, wanted, runs) for one in part]
     outcomes = iter(ran)
     return [next(outcomes) if one is None else one for one in failed]
 
 
-def _check_replicas(
+def _make_replica_scenes(
     scene: Scene, replicas: Sequence[Replica]
 ) -> tuple[list[Recorded | Failed | None], Sequence[Scene]]:
-    """Return which replicas failed already, None for the others, and the scenes of those."""
-    together = drawn_columns(scene, replicas)
+    """Return `Failed` per invalid replica, None for others, and the scenes of those others."""
+    together = scenes_from_drawn_columns(scene, replicas)
     if together is not None:
         return [None] * len(replicas), together
     failed: list[Recorded | Failed | None] = []
@@ -101,11 +106,17 @@ def _check_replicas(
     return failed, scenes
 
 
-def _split(scenes: Sequence[Scene], wanted: Wanted, most: int | None) -> Iterator[Sequence[Scene]]:
-    """Part replicas into as many as may run together."""
+def _split_by_memory(
+    scenes: Sequence[Scene], wanted: Wanted, most: int | None
+) -> Iterator[Sequence[Scene]]:
+    """Yield the scenes in consecutive parts that fit into memory together."""
     if most is None:
-        together = len(scenes) < 2 or are_few(scenes[0], len(scenes))
-        most = max(1, len(scenes)) if together else RunSize.of(scenes[0], wanted or {}).most
+        together = len(scenes) < 2 or surely_fit_in_memory(scenes[0], len(scenes))
+        most = (
+            max(1, len(scenes))
+            if together
+            else RunSize.estimate(scenes[0], wanted or {}).largest_run_count
+        )
     for start in range(0, len(scenes), most):
         yield scenes[start : start + most]
 
@@ -124,7 +135,7 @@ def lock_step_refusal(scene: Scene, replicas: Sequence[Replica]) -> str | None:
 
 
 def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Recorded] | None:
-    """Run scenes in lock step; None where they cannot, or where one of them fails."""
+    """Run scenes in lock step and return recordings; None if it is impossible or one fails."""
     if len(scenes) < 2:
         return None
     sink = ColumnSink()
@@ -147,7 +158,7 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
             tables,
             simulation.ticks_per_s,
             duration_s,
-            partial(_report_unit, scenes, n),
+            partial(_report_of_single_run, scenes, n),
             n in ended,
             shared,
             n,
@@ -157,17 +168,17 @@ def _run_together(scenes: Sequence[Scene], wanted: Wanted, runs: int) -> list[Re
 
 
 def _split_by_replica(tables: dict[str, Columns], count: int) -> list[dict[str, Columns]]:
-    """Part the rows of a common recording, which are in order of the replica."""
+    """Return each run's tables, cut out of a common recording sorted by replica."""
     parts: list[dict[str, Columns]] = [{} for _ in range(count)]
     for table, columns in tables.items():
         starts = np.searchsorted(columns["replica"], np.arange(count + 1)).tolist()  # type: ignore[arg-type]
         own = {name: values for name, values in columns.items() if name != "replica"}
         for number, part in enumerate(parts):
-            part[table] = rows_of(own, slice(starts[number], starts[number + 1]))
+            part[table] = slice_columns(own, slice(starts[number], starts[number + 1]))
     return parts
 
 
-def _report_unit(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
+def _report_of_single_run(scenes: Sequence[Scene], number: int) -> dict[str, Any]:
     return Simulation(scenes[number]).run().report
 
 
@@ -185,7 +196,7 @@ def _run_alone(scene: Scene, wanted: Wanted, runs: int) -> Recorded | Failed:
 
 
 def failure_counts_of_runs(outcomes: Iterable[Recorded | Failed]) -> FailureCounts:
-    """Return what blocks could not do in runs, alone or in lock step, together."""
+    """Return all runs' failure counts, summed: block → what was missing → (failures, cases)."""
     parts: list[FailureCounts] = []
     together: dict[int, tuple[Shared, list[int]]] = {}
     for one in outcomes:
@@ -194,5 +205,11 @@ def failure_counts_of_runs(outcomes: Iterable[Recorded | Failed]) -> FailureCoun
             if (shared := one.shared) is not None:
                 together.setdefault(id(shared), (shared, []))[1].append(one.number)
     return add_counts(
-        [*parts, *(sum_runs(shared.failure_counts, runs) for shared, runs in together.values())]
+        [
+            *parts,
+            *(
+                sum_counts_over_runs(shared.failure_counts, runs)
+                for shared, runs in together.values()
+            ),
+        ]
     )

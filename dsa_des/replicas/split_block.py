@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
+from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message
@@ -24,7 +24,7 @@ class NotInLockStep(RunRefused):
 
 
 class SplitBlock:
-    """One instance per replica, made when its rows come and let go when the next replicas run.
+    """One instance per replica, made when its first rows arrive, closed when later ones run.
 
     Each instance sees only its own replica's rows, as in a run of its own. It is no block and has
     no face of its own: only `run` is called on it.
@@ -48,10 +48,10 @@ class SplitBlock:
 
     def run(self, wake: Wake) -> dict[str, Message] | None:
         """Let every replica's instance handle its rows."""
-        firsts = wake.instants.first_of_each.tolist()
+        firsts = wake.instants.first_position_of_runs.tolist()
         sent: dict[str, list[Message]] = {}
         self._finish_ended_runs(wake.first_run)
-        self._keep_waiting(wake)
+        self._store_early_arrivals(wake)
         for first, end in zip(firsts, [*firsts[1:], len(wake)], strict=True):
             number = int(wake.run[first])
             if number not in self._instances:
@@ -66,11 +66,11 @@ class SplitBlock:
             result = self._instances[number].run(part)
             for port, message in messages_by_output(result, self._outputs).items():
                 run = np.full(len(message), number, dtype=np.int64)
-                sent.setdefault(port, []).append(message.of_runs(run))
+                sent.setdefault(port, []).append(message.with_runs(run))
         return {port: _concatenate(parts) for port, parts in sent.items()} or None
 
-    def _keep_waiting(self, wake: Wake) -> None:
-        """Keep what comes for instances that do not run in this wake, as a wire would."""
+    def _store_early_arrivals(self, wake: Wake) -> None:
+        """Keep messages that arrive for replicas that do not run in this wake, until those run."""
         for port, arrivals in wake._arrived.items():
             for new in arrivals:
                 of = new.message.run
@@ -79,8 +79,8 @@ class SplitBlock:
                     held = self._waiting.setdefault(number, {}).setdefault(port, [])
                     held[:] = _append_arrivals(held, [part] if part else [])
 
-    def close(self, replicas: int) -> None:
-        """Let the last instances go; those of replicas that never ran have their say as well.
+    def close_instances(self, replicas: int) -> None:
+        """Finish instances still open, and make and finish those of replicas that never ran.
 
         `NotInLockStep` if one of these would have told its neighbours something else.
         """
@@ -95,7 +95,7 @@ class SplitBlock:
 
 
 def _rows_of_replica(wake: Wake, rows: slice, number: int) -> Wake:
-    """Return the rows of one replica as its own run would see them."""
+    """Return a wake with the rows of one replica, numbered as run 0, as if it ran alone."""
     held = {}
     for port, (message, row_at) in wake._held.items():
         mine = row_at[rows]
@@ -103,7 +103,7 @@ def _rows_of_replica(wake: Wake, rows: slice, number: int) -> Wake:
         if len(there) == 0:
             continue  # nothing has arrived in this replica yet
         low = int(there.min())
-        part = _message_of_one_run(message.take(slice(low, int(there.max()) + 1)))
+        part = _as_single_run(message.take(slice(low, int(there.max()) + 1)))
         held[port] = part, np.where(mine < 0, -1, mine - low)
     arrived = {
         port: [came for new in arrivals if (came := _arrivals_of_replica(new, number))]
@@ -111,12 +111,12 @@ def _rows_of_replica(wake: Wake, rows: slice, number: int) -> Wake:
     }
 
     def demand() -> dict[str, IntArray]:
-        return {block: _rows_within(asked, rows) for block, asked in wake.demand.items()}
+        return {block: _shifted_rows_within(asked, rows) for block, asked in wake.demand.items()}
 
     instants, scans = RunTicks.of_run(0, wake.ticks[rows]), wake.scans[rows]
 
     def before(scans: IntArray, run: IntArray) -> IntArray:
-        return wake.scans_before[rows]
+        return wake.previous_scan_tick[rows]
 
     idle = wake.idle[rows]
     return Wake(instants, scans, wake.ticks_per_s, held, arrived, demand, clock=before, idle=idle)
@@ -127,16 +127,16 @@ def _arrivals_of_replica(new: Arrivals, number: int) -> Arrivals | None:
     if first == end:
         return None
     instants = RunTicks.of_run(0, new.tick[first:end])
-    return Arrivals(new.source, instants, _message_of_one_run(new.message.take(slice(first, end))))
+    return Arrivals(new.source, instants, _as_single_run(new.message.take(slice(first, end))))
 
 
-def _message_of_one_run(message: Message) -> Message:
-    """Return a message of one run as that of a run by itself."""
-    return message.of_runs(runs_of_single(len(message)))
+def _as_single_run(message: Message) -> Message:
+    """Return a message of one run with its run number set to 0, as if that run were alone."""
+    return message.with_runs(single_run_numbers(len(message)))
 
 
 def _append_arrivals(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
-    """Return what came over each wire, first `one` and then the `other`, by source."""
+    """Return both lists' arrivals, `one` before `other`, joined and sorted by source."""
     by_source = {new.source: new for new in one}
     for new in other:
         old = by_source.get(new.source)
@@ -147,7 +147,7 @@ def _append_arrivals(one: list[Arrivals], other: list[Arrivals]) -> list[Arrival
     return [by_source[name] for name in sorted(by_source)]
 
 
-def _rows_within(asked: IntArray, rows: slice) -> IntArray:
+def _shifted_rows_within(asked: IntArray, rows: slice) -> IntArray:
     first, end = np.searchsorted(asked, [rows.start, rows.stop]).tolist()
     return asked[first:end] - rows.start
 
@@ -161,14 +161,14 @@ def _concatenate(parts: list[Message]) -> Message:
         value = getattr(first, item.name)
         for part in parts[1:]:
             other = getattr(part, item.name)
-            if other is not value and not _is_same(other, value):
+            if other is not value and not _has_same_values(other, value):
                 raise NotInLockStep(f"{type(first).__name__}.{item.name} differs between replicas")
     return type(first).concatenate(parts)
 
 
-def _is_same(one: Any, other: Any) -> bool:
+def _has_same_values(one: Any, other: Any) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other)
     if isinstance(one, Mapping):
-        return one.keys() == other.keys() and all(_is_same(one[k], other[k]) for k in one)
+        return one.keys() == other.keys() and all(_has_same_values(one[k], other[k]) for k in one)
     return bool(one == other)

@@ -60,7 +60,7 @@ Fly = Callable[[Sequence[Replica], IntArray, Sequence[float]], FlownRuns]
 
 @dataclass(frozen=True)
 class Repeated:
-    """Result of a repetition: its estimate, and what one more run with the event would add."""
+    """A repetition's estimated probability, and what one more run with the event would add."""
 
     probability: float
     unseen: float
@@ -69,7 +69,7 @@ class Repeated:
 
 
 class _Repetition:
-    """The runs of a repetition's present stage, with their weights."""
+    """The runs of one repetition in its present stage, with their weights."""
 
     def __init__(self, seed: int, roots: Sequence[Replica]) -> None:
         self._seed, self.runs = seed, list(roots)
@@ -79,14 +79,16 @@ class _Repetition:
         #: The weight of the runs of this stage by that of all first runs; and of one of them.
         self.share, self.unseen = 1.0, 1.0 / len(roots)
 
-    def fly(self, weights: FloatArray) -> None:
-        """Take note that the runs of this stage were flown; the first ones weigh so much."""
+    def count_flown_runs(self, weights: FloatArray) -> None:
+        """Count the runs of this stage as flown, and in the first stage set their weights."""
         self.flown += len(self.runs)
         if self.stage == 0:
             self.weights, self._whole = weights, float(weights.sum())
 
-    def reach(self, reached_s: FloatArray) -> None:
-        """Branch the runs where they came within the level of the next stage, if any did."""
+    def branch_at_next_level(self, reached_s: FloatArray) -> None:
+        """Replace the runs by branches of those that reached the next level, at the given times
+        (NaN: not reached); no runs are left if none did.
+        """
         some = np.flatnonzero(~np.isnan(reached_s))
         total = float(self.weights[some].sum())
         if not total > 0.0:
@@ -96,7 +98,7 @@ class _Repetition:
         self.share = total / self._whole
         self.unseen = self.share / count
         uniform = (key_of(self._seed, "branches", self.stage) >> 11) * 2.0**-53
-        parents = some[choose_parents(self.weights[some], count, uniform)]
+        parents = some[resample_parents(self.weights[some], count, uniform)]
         self.runs = [
             Replica(
                 branch_seed(
@@ -112,8 +114,8 @@ class _Repetition:
         return key_of(self._seed, "branch", self.stage, number) >> 1
 
 
-def choose_parents(weights: FloatArray, count: int, uniform: float) -> IntArray:
-    """Return which of some runs `count` branches come from, each as often as it weighs.
+def resample_parents(weights: FloatArray, count: int, uniform: float) -> IntArray:
+    """Return the index of each of `count` branches' parent, in proportion to the weights.
 
     Of every run there are as many as expected, to the whole number below or above (systematic
     resampling): no run is left out of equal ones.
@@ -124,7 +126,9 @@ def choose_parents(weights: FloatArray, count: int, uniform: float) -> IntArray:
 
 
 def branch_instant_ns(reached_s: float) -> int:
-    """Return from when on a run that came within a level draws anew, ns since its start."""
+    """Return the time, ns since the start, from which a branch of a run that reached a level at
+    `reached_s` draws new random numbers.
+    """
     return math.ceil(reached_s * NANOSECONDS) + _SURELY_NS
 
 
@@ -134,7 +138,7 @@ def run_repetitions(
     levels: Sequence[float],
     fly: Fly,
 ) -> list[Repeated]:
-    """Return what repetitions came to that begin with some runs each, as many in all.
+    """Repeat multilevel splitting, each time from its own starting runs; return all results.
 
     `levels` end with the event itself, and `seeds` are those of the repetitions. They fly together,
     stage by stage, and know nothing of each other.
@@ -151,8 +155,8 @@ def run_repetitions(
             mine = slice(end, end := end + len(one.runs))
             one.error = next((text for text in flown.errors[mine] if text), None)
             if one.error is None:
-                one.fly(flown.weights[mine])
-                one.reach(flown.reached_s[0, mine])
+                one.count_flown_runs(flown.weights[mine])
+                one.branch_at_next_level(flown.reached_s[0, mine])
     return [
         Repeated(one.share if one.runs else 0.0, one.unseen, one.flown, one.error) for one in every
     ]
@@ -161,7 +165,7 @@ def run_repetitions(
 def find_levels(
     roots: Sequence[Replica], seed: int, candidates: FloatArray, fly: Fly
 ) -> tuple[float, ...]:
-    """Return levels, among some that fall to the event, by the runs of a pilot that has some roots.
+    """Return splitting levels among `candidates`, by flying a pilot from given starting runs.
 
     Each is the smallest that a fifth of the runs of a stage reach, or else the next one that any
     does; the last is the event itself. ValueError if no run comes nearer, or a run fails.
@@ -172,7 +176,7 @@ def find_levels(
         flown = fly(pilot.runs, np.full(len(roots), -1), candidates.tolist())
         if said := next((text for text in flown.errors if text), None):
             raise ValueError(f"of the pilot of splitting: {said}")
-        pilot.fly(flown.weights)
+        pilot.count_flown_runs(flown.weights)
         share = (~np.isnan(flown.reached_s) @ pilot.weights) / pilot.weights.sum()
         nearer = np.flatnonzero((share > 0.0) & (candidates < (levels[-1] if levels else np.inf)))
         if not len(nearer):
@@ -182,7 +186,7 @@ def find_levels(
         levels.append(float(candidates[level]))
         if level == len(candidates) - 1:
             return tuple(levels)
-        pilot.reach(flown.reached_s[level])
+        pilot.branch_at_next_level(flown.reached_s[level])
     so_far = f" that came to a score of {levels[-1]:.4g}" if levels else ""
     raise ValueError(
         f"the score never rises: of {len(roots)} runs of the pilot of splitting{so_far} none comes "

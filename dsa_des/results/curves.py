@@ -35,14 +35,14 @@ _FEWEST_BINS, _MOST_BINS = 5, 40
 
 
 def _series_style(mark: tuple[str, str] | None, number: int, of: int) -> tuple[str, str]:
-    """Return colour and marker of a series: a lone one has those of the block it is of."""
+    """Return series `number`'s (colour, marker): `mark` if alone, else the next of `STYLES`."""
     return mark if of == 1 and mark is not None else STYLES[number % len(STYLES)]
 
 
-def _series_along(
+def _group_lines_by_series(
     axes: Sequence[str], lines: Sequence[Line], axis: str, by: str | None
 ) -> dict[str, list[Line]]:
-    """Return label → lines along `axis`, one series per value of all other axes."""
+    """Return series label → lines; a series has one combination of the axes other than `axis`."""
     others = [k for k, name in enumerate(axes) if name != axis]
     if by is not None:  # the named axis first, so that its values share a colour
         others.sort(key=lambda k: axes[k] != by)
@@ -61,7 +61,7 @@ def draw_axis(
     index = axes.index(axis)
     values = list(dict.fromkeys(line.at[index] for line in lines))
     where, numeric = _tick_positions(values, category)
-    series = list(_series_along(axes, lines, axis, by).items())
+    series = list(_group_lines_by_series(axes, lines, axis, by).items())
     with draw_to_png(_WIDE_IN, 6.4 if shown else 4.2, target) as figure:
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
@@ -113,13 +113,13 @@ def _set_ticks(axes: Any, values: list[Any], where: dict[Any, float], numeric: b
     positive = [v for v in values if v > 0]
     if len(positive) == len(values) > 2 and max(values) / min(values) >= 8:
         axes.set_xscale("log")
-        ticks = _drop_touching_labels(values)
+        ticks = _values_with_separate_labels(values)
         axes.set_xticks(ticks, [f"{v:g}" for v in ticks])
         axes.set_xticks([], minor=True)
 
 
-def _drop_touching_labels(values: list[float]) -> list[float]:
-    """Return those values whose labels do not touch on a log axis, the first and the last first."""
+def _values_with_separate_labels(values: list[float]) -> list[float]:
+    """Return the sorted values whose tick labels do not overlap on a log axis, always both ends."""
     low, high = math.log(min(values)), math.log(max(values))
     kept: list[float] = []
     for value in [min(values), max(values), *values]:
@@ -130,7 +130,7 @@ def _drop_touching_labels(values: list[float]) -> list[float]:
 
 
 def _put_legend_beside(axes: Any) -> None:
-    """Put the legend beside the axes, where it covers nothing, in lines that leave them room."""
+    """Put the legend to the right of the axes, with long labels folded into lines."""
     handles, names = axes.get_legend_handles_labels()
     if names:
         names = [textwrap.fill(name, 26) for name in names]
@@ -138,7 +138,7 @@ def _put_legend_beside(axes: Any) -> None:
 
 
 def _shift_series(axes: Any, drawn: Sequence[Any], number: int, of: int) -> None:
-    """Shift a series sideways, so that the intervals of several series do not overlap."""
+    """Shift one series' drawn artists sideways, so that intervals of series do not overlap."""
     from matplotlib.transforms import ScaledTranslation
 
     apart_pt = min(_APART_PT, 30.0 / of)
@@ -209,7 +209,7 @@ def draw_polar(
     with draw_to_png(6.2, 6.0, target) as figure:
         polar = figure.add_subplot(projection="polar")
         polar.set(theta_zero_location="N", theta_direction=-1)
-        series = list(_series_along(axes, lines, axis, None).items())
+        series = list(_group_lines_by_series(axes, lines, axis, None).items())
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
             colour, marker = _series_style(some[0].result.mark, number, len(series))
             some = sorted(some, key=lambda line: line.at[index])
@@ -239,7 +239,7 @@ def draw_polar(
 def _titled_axes(
     target: Target, title: str, width_in: float = _WIDE_IN, height_in: float = 4.2
 ) -> Iterator[Any]:
-    """Give the axes of a figure, which has its title and its legend afterwards."""
+    """Yield a new figure's axes; afterwards add title and legend and write the PNG to `target`."""
     with draw_to_png(width_in, height_in, target) as figure:
         axes = figure.add_subplot()
         yield axes
@@ -309,7 +309,7 @@ def _count_label(series_label: str, values: FloatArray, runs: int) -> str:
 
 
 def _bin_edges(values: FloatArray, most: int) -> FloatArray:
-    """Return the edges of bins that all series share: about the square root of the runs of one."""
+    """Return edges of equal bins over all values' range, about √`most` (the size of a series)."""
     if not len(values):
         return np.array([0.0, 1.0])
     low, high = float(values.min()), float(values.max())
@@ -333,7 +333,8 @@ def draw_series(
     freedom: float | None,
     limits: Sequence[float] = (),
 ) -> None:
-    """Draw the means of a series with their intervals, one line per combination of axis values.
+    """Draw results ``METRIC.NUMBER`` (mean or quantile, with interval) against their number, one
+    line per combination of axis values.
 
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
     `limits` are one for all, or one for each number of the series.
@@ -341,7 +342,7 @@ def draw_series(
     name, _, along = metric.partition(".")
     with _titled_axes(path, title) as axes:
         if freedom is not None and series:
-            _draw_bounds(axes, series[0][1], series[0][2], freedom, confidence)
+            _draw_chi_square_bounds(axes, series[0][1], series[0][2], freedom, confidence)
         for index, (series_label, x, lines) in enumerate(series[:_MOST_LINES]):
             colour, marker = STYLES[index % len(STYLES)]
             value, low, high = (
@@ -363,7 +364,7 @@ def draw_series(
         axes.set(xlabel=axis_label(along) if along else "", ylabel=readable_label(name))
 
 
-def _draw_bounds(
+def _draw_chi_square_bounds(
     axes: Any, x: Sequence[float], lines: Sequence[Line], freedom: float, confidence: float
 ) -> None:
     # The mean of n variables, each with so many degrees, is one with n times as many, by n.
@@ -382,7 +383,7 @@ def _draw_bounds(
 def draw_scatter(
     path: Target, first: Any, second: Any, names: tuple[str, str], metric: str, title: str
 ) -> None:
-    """Draw a result of two conditions against each other, one point per encounter or replica."""
+    """Draw one result under two conditions, a point per encounter or replica, and line y = x."""
     both = ~np.isnan(first) & ~np.isnan(second)
     with _titled_axes(path, title, 5.4, 5.2) as axes:
         if both.any():

@@ -8,19 +8,19 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.results.ratio import PairedRatio, influences, paired_ratio
+from dsa_des.results.ratio import PairedRatio, encounter_influences, paired_ratio
 from dsa_des.results.statistics import (
     FEW,
     Estimate,
     clip_estimate,
     estimate_mean,
     estimate_quantile,
-    normal_error,
     normal_estimate,
-    normal_quantile,
     scale_by_power_of_two,
     standard_error,
-    t_quantile,
+    standard_error_from_interval,
+    two_sided_normal_quantile,
+    two_sided_t_quantile,
     unseen_event_moments,
 )
 
@@ -29,8 +29,8 @@ _RESAMPLES = 1000
 _ALIKE = 1e-9
 
 
-def subtract_without_rounding(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return second minus first; 0 where the two are alike but for how they were rounded.
+def second_minus_first_without_rounding(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return second minus first by element, 0 where they differ by no more than rounding.
 
     That is, within 1e-9 of the largest of them: a quantity is never known so well, and rounding
     adds up to far less.
@@ -42,10 +42,10 @@ def subtract_without_rounding(first: FloatArray, second: FloatArray) -> FloatArr
     return np.where(np.abs(changes) <= resolution, 0.0, changes)
 
 
-def paired_units(
+def paired_unit_means(
     units: IntArray, first: FloatArray, second: FloatArray
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return units, and each one's mean value in two conditions, over runs that have both.
+    """Return (units, means of `first`, means of `second`) per unit over the runs that have both.
 
     Of a unit without such a run one condition keeps its mean, and the other has no value: runs
     with a value on one side only would compare other draws.
@@ -71,7 +71,7 @@ def paired_units(
 
 @dataclass(frozen=True)
 class EstimatedDifference:
-    """How two conditions differ on the same units."""
+    """Paired and unpaired estimates of a result's difference by condition on the same units."""
 
     #: Mean of the differences, unit by unit.
     paired: Estimate
@@ -97,7 +97,7 @@ def estimate_difference(
     *,
     kind: str = "number",
 ) -> EstimatedDifference:
-    """Return second minus first on common units.
+    """Return mean second minus first over units with both, with paired and unpaired intervals.
 
     NaN is a unit without a value. Of all kinds but numbers no interval reaches beyond -1 and 1.
     Events, and shares of which each unit has all or nothing, are counted: their paired interval is
@@ -109,21 +109,21 @@ def estimate_difference(
     """
     here, there = ~np.isnan(first), ~np.isnan(second)
     both = here & there
-    changes = subtract_without_rounding(first[both], second[both])
+    changes = second_minus_first_without_rounding(first[both], second[both])
     whole = kind == "share" and bool(np.isin(changes, (-1.0, 0.0, 1.0)).all())
     counted = len(changes) > 1 and (kind == "event" or whole)
     paired = (
-        _estimate_by_counts(changes, confidence)
+        _bonett_price_difference(changes, confidence)
         if counted
         else estimate_mean(changes, confidence, method)
     )
     apart = counted and bool(np.isin((first[both], second[both]), (0.0, 1.0)).all())
     if apart:
-        unpaired = _estimate_by_shares(first[both], second[both], confidence)
+        unpaired = _agresti_caffo_difference(first[both], second[both], confidence)
     else:
         unpaired = _welch_difference(first[both], changes, confidence)
     if kind != "number":
-        paired, unpaired = _clip_to_shares(paired), _clip_to_shares(unpaired)
+        paired, unpaired = _clip_share_difference(paired), _clip_share_difference(unpaired)
     return EstimatedDifference(
         paired,
         unpaired,
@@ -135,7 +135,8 @@ def estimate_difference(
 def quantile_difference(
     first: FloatArray, second: FloatArray, share: float, confidence: float
 ) -> EstimatedDifference:
-    """Return how a quantile over the same units differs between two conditions.
+    """Return the quantile `share` of `second` minus that of `first` over units that have both, with
+    a paired and an unpaired interval.
 
     The interval is the normal distribution's with the spread of 1000 resamples of the units, always
     the same ones, each with its values under both conditions (Efron and Tibshirani, chapter 8.6).
@@ -156,7 +157,7 @@ def quantile_difference(
         units = generator.integers(0, len(one), len(one))
         low, high = (np.partition(values[units], index)[index] for values in (one, two))
         drawn[k] = high - low
-    apart = math.hypot(*(normal_error(end, confidence) for end in ends))
+    apart = math.hypot(*(standard_error_from_interval(end, confidence) for end in ends))
     return EstimatedDifference(
         normal_estimate(value, float(drawn.std(ddof=1)), len(one), False, confidence),
         normal_estimate(value, apart, len(one), False, confidence),
@@ -164,13 +165,14 @@ def quantile_difference(
     )
 
 
-def _clip_to_shares(result: Estimate) -> Estimate:
-    """Return a difference of shares whose interval holds nothing that none can be."""
+def _clip_share_difference(result: Estimate) -> Estimate:
+    """Return the estimate, its interval cut to [-1, 1], the range of a difference of shares."""
     return clip_estimate(result, -1.0, 1.0)
 
 
-def _estimate_by_counts(changes: FloatArray, confidence: float) -> Estimate:
-    """Return the mean of changes of events, as if one unit more had gained and one more had lost.
+def _bonett_price_difference(changes: FloatArray, confidence: float) -> Estimate:
+    """Return the mean of the paired changes with Bonett and Price's interval: as if one unit more
+    had gained the event and one more had lost it.
 
     Units of several runs differ by parts of an event: there the two lie the smallest part that is
     seen to either side of the mean.
@@ -183,16 +185,18 @@ def _estimate_by_counts(changes: FloatArray, confidence: float) -> Estimate:
     more = np.append(changes, [about - step, about + step])
     middle = math.fsum(more) / len(more)
     error = math.sqrt(math.fsum((more - middle) ** 2)) / len(more)
-    half = t_quantile(count - 1, confidence) * error
+    half = two_sided_t_quantile(count - 1, confidence) * error
     return Estimate(value, middle - half, middle + half, count, count < FEW)
 
 
-def _estimate_by_shares(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
-    """Return the difference of two shares, each as if of one unit more of either kind."""
+def _agresti_caffo_difference(first: FloatArray, second: FloatArray, confidence: float) -> Estimate:
+    """Return the share in `second` minus that in `first` with Agresti and Caffo's interval: one
+    success and one failure are added to each.
+    """
     count = len(first)
     one, other = ((result.sum() + 1.0) / (count + 2.0) for result in (first, second))
     error = math.sqrt((one * (1.0 - one) + other * (1.0 - other)) / (count + 2.0))
-    half = normal_quantile(confidence) * error
+    half = two_sided_normal_quantile(confidence) * error
     value, middle = float(second.mean() - first.mean()), float(other - one)
     return Estimate(value, middle - half, middle + half, count, count < FEW)
 
@@ -209,12 +213,12 @@ def _welch_difference(first: FloatArray, changes: FloatArray, confidence: float)
     if one + other == 0.0:
         return Estimate(value, value, value, count, count < FEW)
     degrees = (one + other) ** 2 * (count - 1) / (one**2 + other**2)
-    half = t_quantile(degrees, confidence) * math.ldexp(math.sqrt(one + other), exponent)
+    half = two_sided_t_quantile(degrees, confidence) * math.ldexp(math.sqrt(one + other), exponent)
     return Estimate(value, value - half, value + half, count, count < FEW)
 
 
 class RatioTerms(NamedTuple):
-    """What a ratio of weighted events is made of, run by run."""
+    """The columns that a ratio of weighted events is computed from, one entry per run."""
 
     below: FloatArray
     above: FloatArray
@@ -227,7 +231,7 @@ class RatioTerms(NamedTuple):
     predicted: FloatArray | None = None
 
     def select_runs(self, some: IntArray | BoolArray) -> "RatioTerms":
-        """Return those of some runs."""
+        """Return the terms of only the given runs (indices or mask)."""
         columns: list[Any] = [None if column is None else column[some] for column in self]
         return RatioTerms(*columns)
 
@@ -235,7 +239,7 @@ class RatioTerms(NamedTuple):
 def ratio_difference(
     first: RatioTerms, second: RatioTerms, alone: Sequence[int], confidence: float
 ) -> EstimatedDifference:
-    """Return how a ratio differs between two conditions on the same runs, by their influences.
+    """Return second ratio minus first on the same runs, with paired and unpaired intervals.
 
     What each run adds to the error of either ratio is subtracted run by run, so what they share
     falls out; the interval is that of the normal distribution. Its variance holds one run more that
@@ -251,7 +255,7 @@ def ratio_difference(
         )  # fmt: skip
         ratios.append(ratio)
         if not ratio.reason:
-            parts.append(influences(below, above, weight, ratio.ratio, some, predicted))
+            parts.append(encounter_influences(below, above, weight, ratio.ratio, some, predicted))
     if len(parts) < 2:
         none = Estimate(np.nan, np.nan, np.nan, 0, True)
         return EstimatedDifference(none, none, *alone)
@@ -259,11 +263,11 @@ def ratio_difference(
     each = np.array([np.bincount(index, weights=part) for part in parts])
     value, few = ratios[1].ratio - ratios[0].ratio, any(ratio.few for ratio in ratios)
     events = np.bincount(index, weights=second.weight * second.below).astype(float)
-    more = 2.0 * _unseen_variance(events)
+    more = 2.0 * _variance_of_unseen_event(events)
     joint = float(np.sqrt(((each[1] - each[0]) ** 2).sum() + more))
     # A ratio whose runs all agree has no such error; its interval tells another.
     alike = sum(
-        normal_error(ratio_as_estimate(ratio), confidence) ** 2
+        standard_error_from_interval(ratio_as_estimate(ratio), confidence) ** 2
         for ratio, part in zip(ratios, each, strict=True)
         if np.abs(part).max() < 1e-12
     )
@@ -275,8 +279,8 @@ def ratio_difference(
     )
 
 
-def _unseen_variance(nominal: FloatArray) -> float:
-    """Return what one event more, or less, adds to the variance of a ratio.
+def _variance_of_unseen_event(nominal: FloatArray) -> float:
+    """Return how much one event more, or less, than were seen adds to the variance of a ratio.
 
     `nominal` are the clusters' terms below the line; one event more weighs what those do, drawn in
     proportion to their weights.
@@ -286,5 +290,5 @@ def _unseen_variance(nominal: FloatArray) -> float:
 
 
 def ratio_as_estimate(ratio: PairedRatio) -> Estimate:
-    """Return a ratio as the summary's other lines are."""
+    """Return the ratio, its interval and its number of clusters as an `Estimate`."""
     return Estimate(ratio.ratio, *ratio.interval, ratio.clusters, ratio.few)

@@ -21,7 +21,7 @@ from dsa_des.results.curves import (
 from dsa_des.results.labels import value_label
 from dsa_des.results.maps import Target, draw_heat, draw_map
 from dsa_des.results.record import FigureRecord
-from dsa_des.results.summary import Line, results_of_series
+from dsa_des.results.summary import Line, result_numbers_of_series
 from dsa_des.results.tables import Tables
 
 #: Letters of a figure's title.
@@ -75,7 +75,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
     if figure.kind in ("histogram", "cdf"):
         return _draw_spread(target, tables, figure, title)
     if figure.kind == "series":
-        series = _series_of(tables, metric)
+        series = _numbered_result_series(tables, metric)
         draw_series(target, series, metric, title, confidence, figure.freedom,
                     figure.limits)  # fmt: skip
         return True
@@ -109,7 +109,9 @@ def _shorten_title(title: str) -> str:
 
 
 def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: str) -> bool:
-    """Draw how a result is spread over the runs, one series per value of an axis."""
+    """Draw a histogram or a cumulative distribution of a result over the runs, one series per value
+    of an axis; return False if it is not a number.
+    """
     rows, metric = tables.rows, str(figure.metric)
     (result,) = (result for result in tables.results if result.name == metric)
     if not result.is_number:
@@ -128,9 +130,9 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
     return True
 
 
-def _series_of(tables: Tables, metric: str) -> list[Series]:
-    """Return the results that differ in a number, one series per combination of axis values."""
-    known = results_of_series(metric, [line.result.name for line in tables.lines])
+def _numbered_result_series(tables: Tables, metric: str) -> list[Series]:
+    """Return (label, numbers, lines) of ``METRIC.NUMBER`` for each combination of axis values."""
+    known = result_numbers_of_series(metric, [line.result.name for line in tables.lines])
     by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
     for line in tables.lines:
         if line.result.name in known:
@@ -147,7 +149,7 @@ def _series_of(tables: Tables, metric: str) -> list[Series]:
 
 
 def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]) -> list[Path]:
-    """Draw results of two types in one block against each other."""
+    """Draw results at each axis value against the baseline, one figure each; return the paths."""
     index = tables.rows.axes.index(axis)
     paths = []
     for value, others, base, chosen in tables.rows.comparisons_with_baseline(axis, baseline):
@@ -155,15 +157,17 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
         for metric in tables.notable_results(only):
             _, first, second = tables.rows.paired_values(metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
-            drawn = _figure_stream(f"{safe_name(name)}.png")
+            drawn = _figure_stream(f"{safe_file_name(name)}.png")
             names = str(baseline), str(value)
             draw_scatter(drawn, first, second, names, metric, _shorten_title(tables.record.title))
             paths.append(_write_figure(tables, drawn))
     return paths
 
 
-def safe_name(name: str) -> str:
-    """Return a text as the name of a file: without signs of a path, and short enough for one."""
+def safe_file_name(name: str) -> str:
+    """Return a text as a file name: signs other than letters, digits and ``-_.`` become ``_``, and
+    a long one is cut and gets a hash.
+    """
     plain = "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
     if len(plain.encode()) <= _LONGEST_NAME:
         return plain

@@ -13,9 +13,15 @@ from typing import TYPE_CHECKING, TypeVar
 from pydantic import ValidationError
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_file import PREFIX, lock_file, write_file
+from dsa_des.files.output_file import PREFIX, try_lock_file, write_file
 from dsa_des.files.output_names import describe_write_error
-from dsa_des.files.sealed_files import ABOUT, is_sealed, open_lock, read_regular, seal_content
+from dsa_des.files.sealed_files import (
+    ABOUT,
+    is_sealed,
+    open_lock_file,
+    read_regular_file,
+    seal_parquet,
+)
 from dsa_des.record.failure_counts import FailureCounts, add_counts
 from dsa_des.results.record import StudyHead, StudyRecord
 
@@ -38,13 +44,13 @@ class NotWritten(Exception):
 
 @dataclass(frozen=True)
 class Parts:
-    """Where the parts of a study go, and whose they are: all that who writes one need know."""
+    """The folder for parts of a study and the hash that seals them: all a writing process needs."""
 
     folder: Path
     study_sha256: str
 
-    def check(self) -> None:
-        """Raise NotWritten where this process does not find the study in its folder."""
+    def check_same_study(self) -> None:
+        """Raise NotWritten unless this process sees a folder holding the study with this hash."""
         try:
             there = StudyFolder(self.folder).head.study_sha256
         except UsageError as error:
@@ -55,16 +61,16 @@ class Parts:
             raise NotWritten(f"{self.folder}: holds another study by now")
 
     def write(self, name: str, content: bytes) -> None:
-        """Write a part as a whole, sealed as one of the study, whoever else writes it too."""
+        """Write a part file in one step, with the study's hash; several processes may write it."""
         path = self.folder / PARTS / f"{name}.parquet"
         try:
-            write_file(path, seal_content(content, f"{self.study_sha256} {name}"), to_disk=True)
+            write_file(path, seal_parquet(content, f"{self.study_sha256} {name}"), to_disk=True)
         except OSError as error:
             raise NotWritten(error.strerror or str(error)) from None
 
 
 class StudyFolder:
-    """Where a study keeps its results.
+    """The folder that a study's results are stored in.
 
     It may hold anything: what is not a regular file of this very study is no part of it, and
     nothing is written through a link.
@@ -77,7 +83,7 @@ class StudyFolder:
         self._record: StudyRecord | None = None
 
     def open(self, description: str, *, resume: bool) -> None:
-        """Make the folder, or take up the one that is there, and lock it until `close`.
+        """Create the folder, or open one to resume its study, and hold its lock until `close`.
 
         `description` is the content of ``study.json``. A UsageError where the folder holds
         something else, another study or results that were not to be resumed, or another process
@@ -92,7 +98,7 @@ class StudyFolder:
             self.parts.mkdir(parents=True, exist_ok=True)
             self._take_lock()
             # Only now is all that is there ours: before, it may have been another process's.
-            self._resume(description, resume=resume)
+            self._begin_or_resume(description, resume=resume)
         except OSError as error:
             self.close()
             why = describe_write_error(error, self.path)
@@ -102,7 +108,7 @@ class StudyFolder:
             raise
 
     def close(self) -> None:
-        """Let other processes write into the folder."""
+        """Release the folder's lock, so that other processes may write into it."""
         if self._lock is not None:
             os.close(self._lock)
             self._lock = None
@@ -120,14 +126,14 @@ class StudyFolder:
 
     def _take_lock(self) -> None:
         try:
-            self._lock = open_lock(self.path / LOCK)
+            self._lock = open_lock_file(self.path / LOCK)
         except OSError as error:
             reason = f"{self.path / LOCK}: cannot be written: {error.strerror}"
             raise UsageError(reason) from None
-        if lock_file(self._lock) is False:
+        if try_lock_file(self._lock) is False:
             raise UsageError(f"{self.path}: another process is running this study")
 
-    def _resume(self, text: str, *, resume: bool) -> None:
+    def _begin_or_resume(self, text: str, *, resume: bool) -> None:
         known = os.path.lexists(self.path / STUDY_JSON)
         if known and not resume:
             raise UsageError(
@@ -145,11 +151,11 @@ class StudyFolder:
         self.part_names()
         self._remove_abandoned_files()
         path = self.path / STUDY_JSON
-        if not known or read_regular(path) != text.encode():  # as an older version wrote it
+        if not known or read_regular_file(path) != text.encode():  # as an older version wrote it
             self.write_file(STUDY_JSON, text.encode())
 
     def _remove_abandoned_files(self) -> None:
-        """Remove what processes left that were killed while they wrote."""
+        """Remove temporary files left behind by processes that were killed while writing."""
         earlier = r"\.(part-|study\.json|summary\.|differences\.|figure-|scatter-).*\.\d+"
         ours = re.compile(rf"{re.escape(PREFIX)}[0-9a-f]{{12}}|{earlier}")
         for folder in (self.parts, self.path):
@@ -160,12 +166,12 @@ class StudyFolder:
 
     @property
     def head(self) -> StudyHead:
-        """Which study is there."""
+        """File name and hash of the study that the folder holds."""
         return self._read_head(StudyHead)
 
     @property
     def record(self) -> StudyRecord:
-        """What the folder says of its study."""
+        """The record of the study that the folder holds, read once."""
         if self._record is None:
             self._record = self._read_head(StudyRecord)
         return self._record
@@ -175,7 +181,7 @@ class StudyFolder:
         if not os.path.lexists(path):
             raise UsageError(f"{self.path}: is not the folder of a study: it has no {STUDY_JSON}")
         try:
-            return model.model_validate_json(read_regular(path, _MOST_JSON_BYTES))
+            return model.model_validate_json(read_regular_file(path, _MOST_JSON_BYTES))
         except OSError as error:
             raise UsageError(f"{path}: cannot be read: {error.strerror}") from None
         except ValidationError as error:
@@ -191,7 +197,7 @@ class StudyFolder:
     # -- parts -----------------------------------------------------------------------------
 
     def part_names(self) -> list[str]:
-        """Return the names of the parts that are there, good or not, in order."""
+        """Return the sorted names of the part files in the folder, whether readable or not."""
         if self.parts.is_symlink():
             raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
         try:
@@ -204,13 +210,13 @@ class StudyFolder:
         return [file.removesuffix(".parquet") for file in files if not file.startswith(".")]
 
     def part(self, name: str, columns: Sequence[str] | None = None) -> "pa.Table | None":
-        """Return the rows of a part; None if it is not there, damaged, or of another study.
+        """Return a part's table; None if it is missing, damaged, or belongs to another study.
 
         Only some `columns` are read of a part that was checked before.
         """
         table = self._read_sealed(self.parts / f"{name}.parquet", name, columns)
         table = None if table is None else table.replace_schema_metadata(None)
-        whole = table is None or columns is not None or _fits(table, self.record)
+        whole = table is None or columns is not None or _matches_record(table, self.record)
         return table if whole else None
 
     def _read_sealed(
@@ -220,15 +226,15 @@ class StudyFolder:
         import pyarrow.parquet as pq
 
         try:
-            content = read_regular(path)
-            if not is_sealed(content, self._owner(name)):
+            content = read_regular_file(path)
+            if not is_sealed(content, self._seal_text(name)):
                 return None
             return pq.read_table(io.BytesIO(content), columns=columns)
         except (OSError, MemoryError, pa.ArrowException):
             return None
 
     def failure_counts(self, names: Iterable[str] | None = None) -> FailureCounts:
-        """Return what blocks could not do in the runs of some parts, by default of all."""
+        """Return block → kind of failure → (failed, attempts), summed over named or all parts."""
         parts = []
         for name in self.part_names() if names is None else names:
             table = self._read_sealed(self.parts / f"{name}.parquet", name, ["cell"])
@@ -236,15 +242,15 @@ class StudyFolder:
         return add_counts(parts)
 
     @property
-    def destination(self) -> Parts:
-        """Where any process may write parts of this study."""
+    def parts_destination(self) -> Parts:
+        """The absolute folder and study's hash, with which any process can write parts of it."""
         return Parts(self.path.resolve(), self.record.study_sha256)
 
     def remove_part(self, name: str) -> None:
         """Remove a part that no longer belongs to the study."""
         (self.parts / f"{name}.parquet").unlink(missing_ok=True)
 
-    def _owner(self, name: str) -> str:
+    def _seal_text(self, name: str) -> str:
         return f"{self.record.study_sha256} {name}"
 
     def results(self) -> "pa.Table":
@@ -260,7 +266,7 @@ class StudyFolder:
     def each_part(
         self, before_round: int | None = None, columns: Sequence[str] | None = None
     ) -> Iterator["pa.Table"]:
-        """Give the rows of each part, in order of their names.
+        """Yield each part's table, by part name; UsageError at the end if some were unreadable.
 
         Only those of rounds before one, and only some columns of parts checked before.
         """
@@ -288,21 +294,21 @@ class StudyFolder:
     # -- other files -----------------------------------------------------------------------
 
     def write_file(self, name: str, content: bytes) -> None:
-        """Write a file beside the parts as a whole."""
+        """Write a file beside the parts in a single step."""
         write_file(self.path / name, content, to_disk=True)
 
     def write_table(self, name: str, content: bytes) -> None:
         """Write a table beside the parts, sealed as one of this study."""
-        self.write_file(name, seal_content(content, self._owner(name)))
+        self.write_file(name, seal_parquet(content, self._seal_text(name)))
 
     def table(self, name: str) -> "pa.Table | None":
-        """Return a table beside the parts; None if it is not there or not of this study."""
+        """Return a table beside the parts; None if it is missing or belongs to another study."""
         table = self._read_sealed(self.path / name, name, None)
         return None if table is None else table.replace_schema_metadata(None)
 
 
 def failure_counts_of_part(table: "pa.Table") -> FailureCounts:
-    """Return what blocks could not do in the runs of a part, as its metadata says."""
+    """Return block → kind of failure → (failed, attempts) in a part's runs, from its metadata."""
     text = (table.schema.metadata or {}).get(ABOUT, b"{}")
     with suppress(ValueError, RecursionError):
         found = json.loads(text)
@@ -317,8 +323,8 @@ def failure_counts_of_part(table: "pa.Table") -> FailureCounts:
 _MOST_NAMED = 10
 
 
-def _fits(table: "pa.Table", record: StudyRecord) -> bool:
-    """Return whether rows have the columns of a study, and values where there must be some."""
+def _matches_record(table: "pa.Table", record: StudyRecord) -> bool:
+    """Return whether a part has the study's columns, cells in range, and identifies every run."""
     import pyarrow.compute as pc
 
     if not table.schema.equals(record.schema_of_parts()):

@@ -22,7 +22,7 @@ _CONSONANTS = re.compile(r"[bcdfghjklmnpqrstvwxz]{2,4}")
 
 
 class AxisName(str):
-    """The column of an axis, which knows what it is called where it counts items of a list."""
+    """The column name of an axis, with words for messages if its key passes through list items."""
 
     words: str
 
@@ -34,7 +34,7 @@ class AxisName(str):
 
 
 def unit_of(name: str) -> str:
-    """Return ``m`` for ``declaration_range_m.radar``; nothing for a pure number."""
+    """Return the unit in a column's name: ``m`` in ``declaration_range_m.radar``; empty if none."""
     return _split_unit(name.partition(".")[0])[1]
 
 
@@ -42,45 +42,47 @@ def readable_label(name: str) -> str:
     """Return ``Declaration range, radar (m)`` for ``declaration_range_m.radar``."""
     words, _, who = name.partition(".")
     words, unit = _split_unit(words)
-    what = _capitalise(_add_spaces(words)) + (f", {_add_spaces(who)}" if who else "")
+    what = _capitalise(_readable_words(words)) + (f", {_readable_words(who)}" if who else "")
     return figure_text(f"{what} ({unit})" if unit else what, 60)
 
 
 def axis_label(key: str) -> str:
     """Return ``Radar scan rate (Hz)`` for ``radar.scan_rate_hz``, ``Type of fusion`` for a swap."""
     if key.startswith("swap."):
-        return figure_text(f"Type of {_add_spaces(key.removeprefix('swap.'))}", 60)
+        return figure_text(f"Type of {_readable_words(key.removeprefix('swap.'))}", 60)
     key = key.words if isinstance(key, AxisName) else key
     words, unit = _split_unit(key.removeprefix("blocks."))
-    label = _capitalise(_add_spaces(words.replace(".", " ")))
+    label = _capitalise(_readable_words(words.replace(".", " ")))
     return figure_text(f"{label} ({unit})" if unit else label, 60)
 
 
 def value_label(axis: str, value: object) -> str:
-    """Return ``radar scan rate 5 Hz`` for a value of an axis; a text is its own label."""
+    """Return the label of an axis value: ``radar scan rate 5 Hz`` for a number, a text as it is."""
     if not isinstance(value, int | float):
         return figure_text(value)
     words, unit = _split_unit(axis.words if isinstance(axis, AxisName) else axis)
-    name = _add_spaces(words.replace(".", " "))
+    name = _readable_words(words.replace(".", " "))
     # However long the name is, the value stands behind it.
     return f"{figure_text(name, 50)} {value:g}{'' if unit in ('', '°') else ' '}{unit}"
 
 
 def short_text(value: object) -> str:
-    """Return a value for a table: numbers to five digits."""
+    """Return a value as table text: five significant digits, NaN as a dash, long texts cut."""
     if isinstance(value, float):
         return "-" if value != value else f"{value:.5g}"
     return shorten(value)
 
 
 def round_to_interval(half: float, *numbers: float) -> list[str]:
-    """Return numbers as texts, rounded to two digits of half an interval."""
+    """Return numbers as texts, rounded to the second significant digit of the half-width `half`."""
     places = 1 - math.floor(math.log10(half))
     return [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in numbers]
 
 
 def format_with_interval(value: float, half: float) -> str:
-    """Return ``+1.24 ± 0.13``; three digits of a difference without an interval."""
+    """Return ``+1.24 ± 0.13`` for a difference and the half-width of its interval; three digits
+    without ± where it has no interval.
+    """
     sign = "+" if value > 0 else ""
     if not 0.0 < half < math.inf:
         return sign + (f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}")
@@ -88,7 +90,7 @@ def format_with_interval(value: float, half: float) -> str:
 
 
 def _split_unit(name: str) -> tuple[str, str]:
-    """Return a name without its unit, and the unit as it is written."""
+    """Return (name without unit, unit as printed): ``speed`` and ``m/s`` for ``speed_m_s``."""
     match = _PER.search(name)
     if match:
         above, below = (_UNITS.get(part, part) for part in match.groups())
@@ -103,7 +105,7 @@ def _split_unit(name: str) -> tuple[str, str]:
 _ITEM = re.compile(r"(\w+?)s?\[(\d+)\]")
 
 
-def _add_spaces(name: str) -> str:
+def _readable_words(name: str) -> str:
     name = _ITEM.sub(lambda match: f"{match[1]} {int(match[2]) + 1}", name)
     words = name.replace("_", " ").split(" ")
     return " ".join(word.upper() if _is_abbreviation(word) else word for word in words)

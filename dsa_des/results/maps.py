@@ -54,7 +54,13 @@ def draw_heat(
                 if not np.isnan(value):
                     ink = "white" if value < middle else "black"
                     axes.text(
-                        c, r, three_digits(value), ha="center", va="center", color=ink, size=8
+                        c,
+                        r,
+                        format_three_digits(value),
+                        ha="center",
+                        va="center",
+                        color=ink,
+                        size=8,
                     )
         axes.set_xlabel(axis_label(x))
         axes.set_ylabel(axis_label(y))
@@ -67,8 +73,8 @@ def _short_text(value: Any) -> str:
     return f"{value:.4g}" if isinstance(value, float) else figure_text(value)
 
 
-def three_digits(value: float) -> str:
-    """Return a number to three digits, or to whole ones."""
+def format_three_digits(value: float) -> str:
+    """Return a number as text with three significant digits, or as a whole number from 100 on."""
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 

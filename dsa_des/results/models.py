@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from pydantic import ConfigDict, ValidationError
 
-from dsa_des.files.sealed_files import read_regular
+from dsa_des.files.sealed_files import read_regular_file
 from dsa_des.record.version import __version__
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import StrictRecord
@@ -22,7 +22,7 @@ _Record = TypeVar("_Record", bound=StrictRecord)
 
 
 class ModelRecord(StrictRecord):
-    """A block: its type, what that is, and the rungs of accuracy that it stands on."""
+    """A block in a report: name, type, what it models, the rung chosen of each accuracy ladder."""
 
     block: str
     type: str
@@ -32,7 +32,7 @@ class ModelRecord(StrictRecord):
 
 
 class EffectRecord(StrictRecord):
-    """An effect that is simulated or left out, and because of what."""
+    """One effect of a block, whether it is simulated or left out, and why."""
 
     block: str
     effect: str
@@ -43,7 +43,7 @@ class EffectRecord(StrictRecord):
 
 
 class SceneRecord(StrictRecord):
-    """The scene of a cell; of cells after the first, only what is not so in the first."""
+    """Models, effects and spared work of a cell's scene; after the first cell only what differs."""
 
     where: str
     models: list[ModelRecord]
@@ -53,7 +53,7 @@ class SceneRecord(StrictRecord):
 
 
 class Explained(StrictRecord):
-    """What a study's runs are made of."""
+    """Package versions, resolved scene and models of a study's runs, as in ``explained.json``."""
 
     versions: dict[str, str]
     #: The first run's scene with every default written out, as TOML.
@@ -73,7 +73,9 @@ def versions() -> dict[str, str]:
 
 
 class ErrorRecord(StrictRecord):
-    """How far the model of a block is off in one quantity, over target-scans; NaN where unknown."""
+    """Mean, 95th percentile and largest error of a block's model in one quantity, over
+    target-scans; NaN where unknown.
+    """
 
     model_config = ConfigDict(allow_inf_nan=True)
 
@@ -90,7 +92,7 @@ class ErrorRecord(StrictRecord):
 
 
 class MeasuredErrors(StrictRecord):
-    """Errors of the models of one run, and of what nothing could be measured."""
+    """Measured errors of the models of one run, and notes on what could not be measured."""
 
     command: str
     rows: list[ErrorRecord]
@@ -98,17 +100,17 @@ class MeasuredErrors(StrictRecord):
 
 
 def read_explained(folder: StudyFolder) -> Explained | None:
-    """Return the models of a folder's runs; None where it holds no record that can be used."""
+    """Return the record of models and versions in the study's folder; None if none can be read."""
     return _read_record(folder, EXPLAINED, Explained)
 
 
-def read_errors(folder: StudyFolder) -> MeasuredErrors | None:
-    """Return the errors that a folder holds; None where it holds none that can be used."""
+def read_model_errors(folder: StudyFolder) -> MeasuredErrors | None:
+    """Return the measured model errors in the study's folder; None where none can be read."""
     return _read_record(folder, ERRORS, MeasuredErrors)
 
 
 def _read_record(folder: StudyFolder, name: str, model: type[_Record]) -> _Record | None:
     try:
-        return model.model_validate_json(read_regular(folder.path / name, _MOST_BYTES))
+        return model.model_validate_json(read_regular_file(folder.path / name, _MOST_BYTES))
     except (OSError, ValidationError):
         return None

@@ -34,7 +34,7 @@ def print_study_tables(console: Any, tables: Tables, only: Sequence[str] = ()) -
     for line in lines[:_MOST_SHOWN]:
         e = line.estimate
         cut_off = cut_off_text(line)
-        value, interval = round_estimate(e)
+        value, interval = rounded_value_and_interval(e)
         row = [*map(short_text, line.at), line.result.name, value]
         row += [f"({cut_off})" if cut_off else "", interval, str(e.count)]
         row += ["" if sum(many for _, many in line.cut_off) >= line.missing else str(line.missing)]
@@ -74,7 +74,7 @@ def print_study_tables(console: Any, tables: Tables, only: Sequence[str] = ()) -
             "(N of RUNS at the start): so many values are only where the run began or ended; "
             "without that they would lie beyond it"
         )
-    _note_unreached(console, tables)
+    _warn_of_wide_intervals(console, tables)
     if len(lines) < len(tables.lines):
         console.print("all results: summary.parquet, or dsa-des study show FOLDER")
     for sentence in failure_sentences(tables.folder.failure_counts()):
@@ -98,13 +98,14 @@ ANSWER_HEADS = (
 
 
 def answer_cells(tables: Tables, answer: Answer) -> list[str]:
-    """Return the table cells of a requirement's finding, in the order of `ANSWER_HEADS`."""
+    """Return the table row of the answer to a requirement, one text for each of `ANSWER_HEADS`."""
     estimate = answer.line.estimate
     notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
     notes += ["few"] if estimate.few else []
     return [
         answer.requirement.text(), answer.requirement.axis, tables.other_axes_text(answer),
-        "none" if answer.value is None else short_text(answer.value), *round_estimate(estimate),
+        "none" if answer.value is None else short_text(answer.value),
+        *rounded_value_and_interval(estimate),
         "none" if answer.estimated is None else short_text(answer.estimated),
         "; ".join(notes),
     ]  # fmt: skip
@@ -129,7 +130,7 @@ RATIO_HEADS = (
 
 
 def ratio_cells(line: Line) -> list[str]:
-    """Return the cells of a ratio, as `RATIO_HEADS` names them."""
+    """Return a ratio's table row (parts, both intervals, event counts), texts for `RATIO_HEADS`."""
     ratio = line.ratio
     assert ratio is not None
     by = {r.method: r for r in (ratio, line.other) if r is not None}
@@ -151,7 +152,7 @@ def ratio_cells(line: Line) -> list[str]:
 
 
 def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
-    """Print of what each ratio is made, and both of its intervals."""
+    """Print a table of the parts of each ratio and of both of its intervals."""
     rows = [[*map(short_text, line.at), *ratio_cells(line)] for line in lines[:_MOST_SHOWN]]
     level = f"{100 * tables.record.confidence:g} %"
     headings = [*tables.rows.axes, *RATIO_HEADS]
@@ -160,11 +161,13 @@ def _show_ratios(console: Any, tables: Tables, lines: Sequence[Line]) -> None:
     if tables.record.geometry:
         for line in lines[:_MOST_SHOWN]:
             if line.ratio is not None and line.ratio.encounters:
-                console.print(gain_text(line))
+                console.print(sampling_gain_text(line))
 
 
-def gain_text(line: Line) -> str:
-    """Return how many runs were flown for a ratio, and what that is worth."""
+def sampling_gain_text(line: Line) -> str:
+    """Return a sentence: how many runs were flown for a ratio, and how much more an interval as
+    wide would cost with all flown.
+    """
     ratio = line.ratio
     assert ratio is not None
     at = "".join(f"{short_text(value)}: " for value in line.at)
@@ -180,7 +183,7 @@ def gain_text(line: Line) -> str:
     return f"{said}; as wide an interval costs {ratio.gain:.2g} times as much with all of them"
 
 
-def _note_unreached(console: Any, tables: Tables) -> None:
+def _warn_of_wide_intervals(console: Any, tables: Tables) -> None:
     stop = tables.record.stop_when
     if stop is None:
         return
@@ -209,8 +212,8 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
         only = f"{d.only_first}/{d.only_second}" if d.only_first or d.only_second else ""
         rows.append(
             [short_text(item.value), *map(short_text, item.at), item.result.name,
-            *round_estimate(d.paired),
-             str(d.paired.count), only, round_estimate(d.unpaired)[1].rstrip(" *")]
+            *rounded_value_and_interval(d.paired),
+             str(d.paired.count), only, rounded_value_and_interval(d.unpaired)[1].rstrip(" *")]
         )  # fmt: skip
     title = f"less the same at {shorten(axis)} = {short_text(baseline)}, pair by pair"
     print_table(console, title, headings, rows, group=1 + len(others))
@@ -219,7 +222,7 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
 
 
 def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) -> None:
-    """Print how often events happen, by how often at the baseline, weighted."""
+    """Print a table of how often each event happens relative to the baseline, with weights."""
     assert tables.baseline is not None
     axis, baseline = tables.baseline
     others = [name for name in tables.rows.axes if name != axis]
@@ -242,7 +245,7 @@ def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) 
 
 
 def interval_text(estimate: Estimate) -> str:
-    """Return an interval for a table; nothing without one, an asterisk where values are few."""
+    """Return the interval as ``LOW to HIGH``; empty if none, with an asterisk if on few values."""
     if estimate.low != estimate.low:
         return ""
     return f"{short_text(estimate.low)} to {short_text(estimate.high)}" + (
@@ -250,8 +253,8 @@ def interval_text(estimate: Estimate) -> str:
     )
 
 
-def round_estimate(estimate: Estimate) -> tuple[str, str]:
-    """Return a value and its interval, rounded to two digits of half the interval."""
+def rounded_value_and_interval(estimate: Estimate) -> tuple[str, str]:
+    """Return (value, interval) texts, rounded to two significant digits of its half-width."""
     value, low, high = (
         0.0 if abs(number) < _NOTHING else number
         for number in (estimate.value, estimate.low, estimate.high)

@@ -57,7 +57,7 @@ FORESEEN_COST = 0.075
 
 @dataclass(frozen=True)
 class PairedRatio:
-    """A ratio with what is uncertain about it."""
+    """Mitigated to nominal events over the same encounters: ratio, error, interval and counts."""
 
     #: NaN where `reason` says why there is none.
     ratio: float
@@ -108,7 +108,7 @@ def paired_ratio(
     resamples: int = 4000,
     seed: int = 0,
 ) -> PairedRatio:
-    """Return the ratio of paired encounters with its error and its interval.
+    """Return mitigated to nominal events over the same encounters: ratio, error and interval.
 
     Parameters
     ----------
@@ -150,7 +150,7 @@ def paired_ratio(
     """
     n = _checked_flags("nominal", nominal)
     s = None if stands_for is None else _checked_expansions(stands_for, len(n))
-    m = _flags_flown(mitigated, s)
+    m = _checked_mitigated_flags(mitigated, s)
     w, _ = scale_by_power_of_two(
         _checked_weights(weight, len(n))
     )  # all that follows is of weights relative to each other
@@ -163,11 +163,11 @@ def paired_ratio(
     if resamples < 2:
         raise ValueError(f"resamples = {resamples}: must be 2 or more")
     d = None if s is None or predicted is None else _checked_flags("predicted", predicted)
-    y = w * _estimated_flags(m, s, d)
-    terms = _ratio_terms_by_cluster(w, w * n, y, cluster)
+    y = w * _unweighted_numerator_terms(m, s, d)
+    terms = _sum_ratio_terms_by_cluster(w, w * n, y, cluster)
     total, below = math.fsum(w), math.fsum(w * n)
     squares = math.fsum(terms[0] ** 2)
-    counts = len(n), *_count_events(n, m, s)
+    counts = len(n), *_count_nominal_mitigated_induced(n, m, s)
     sizes = total * total / squares if squares > 0.0 else 0.0
     if below == 0.0:
         nan = math.nan
@@ -179,7 +179,9 @@ def paired_ratio(
             flown=_count_flown(n, s),
         )  # fmt: skip
     above = math.fsum(y)
-    induced = _estimated_flags(np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0))
+    induced = _unweighted_numerator_terms(
+        np.maximum(m - n, 0.0), s, None if d is None else d * (n == 0.0)
+    )
     added = max(0.0, math.fsum(w * induced))
     left, ratio = above - added, above / below
     each, x, y = terms
@@ -211,15 +213,16 @@ def paired_ratio(
     return PairedRatio(
         ratio, added / below, left / below, error, interval, unpaired, sizes, *counts,
         below / total, above / total, method, "", few, len(each),
-        *_flown_and_gain(n, m, w, s, d, ratio, squared),
+        *_count_flown_and_gain(n, m, w, s, d, ratio, squared),
     )  # fmt: skip
 
 
-def _flown_and_gain(
+def _count_flown_and_gain(
     nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, stands_for: FloatArray | None,
     predicted: FloatArray | None, ratio: float, sampled: float,
 ) -> tuple[int, float]:  # fmt: skip
-    """Return how many were flown, and by how much that is cheaper than all at the same width.
+    """Return (encounters flown, gain): the gain is how many times as much an interval as wide costs
+    with all encounters flown.
 
     `sampled` is the sum of the squared residuals of clusters. Encounters are drawn independently,
     so what those of a cluster have in common is as much with all of them flown.
@@ -227,7 +230,9 @@ def _flown_and_gain(
     flown = _count_flown(nominal, stands_for)
     if stands_for is None:
         return flown, 1.0
-    each = (weight * (_estimated_flags(mitigated, stands_for, predicted) - ratio * nominal)) ** 2
+    each = (
+        weight * (_unweighted_numerator_terms(mitigated, stands_for, predicted) - ratio * nominal)
+    ) ** 2
     plain = math.fsum(stands_for * (weight * (mitigated - ratio * nominal)) ** 2)
     plain += sampled - math.fsum(each)
     cost = flown / len(nominal) + FORESEEN_COST
@@ -238,7 +243,7 @@ def _count_flown(nominal: FloatArray, stands_for: FloatArray | None) -> int:
     return len(nominal) if stands_for is None else int(np.count_nonzero(stands_for))
 
 
-def sampled_share(
+def share_from_flown_sample(
     whole: FloatArray,
     part: FloatArray,
     weight: FloatArray,
@@ -247,7 +252,7 @@ def sampled_share(
     predicted: FloatArray | None,
     **options: Any,
 ) -> PairedRatio:
-    """Return which share of some events is of a kind that only the encounters flown know.
+    """Return the share of `whole` events that are also `part`, estimated from flown encounters.
 
     The part by all events, as `paired_ratio` has it; or by those that the flown ones stand for (J.
     Hájek's ratio), which is surer where the share is large, and never above 1: the surer of both.
@@ -271,7 +276,7 @@ def sampled_share(
     return replace(one, interval=(low, min(high, 1.0)))
 
 
-def influences(
+def encounter_influences(
     nominal: npt.ArrayLike,
     mitigated: npt.ArrayLike,
     weight: npt.ArrayLike | None,
@@ -279,30 +284,38 @@ def influences(
     stands_for: npt.ArrayLike | None = None,
     predicted: npt.ArrayLike | None = None,
 ) -> FloatArray:
-    """Return what each encounter adds to the error of a ratio: their squares sum to its variance.
+    """Return contributions to a ratio's error, (encounters,); their squares sum to its variance.
 
     Values are those of `paired_ratio`.
     """
     n = _checked_flags("nominal", nominal)
     s = None if stands_for is None else _checked_expansions(stands_for, len(n))
-    m, (w, _) = _flags_flown(mitigated, s), scale_by_power_of_two(_checked_weights(weight, len(n)))
+    m, (w, _) = (
+        _checked_mitigated_flags(mitigated, s),
+        scale_by_power_of_two(_checked_weights(weight, len(n))),
+    )
     d = None if s is None or predicted is None else _checked_flags("predicted", predicted)
-    result: FloatArray = w * (_estimated_flags(m, s, d) - ratio * n) / math.fsum(w * n)
+    result: FloatArray = w * (_unweighted_numerator_terms(m, s, d) - ratio * n) / math.fsum(w * n)
     return result
 
 
-def _estimated_flags(
+def _unweighted_numerator_terms(
     flags: FloatArray, stands_for: FloatArray | None, predicted: FloatArray | None
 ) -> FloatArray:
-    """Return what each encounter counts with above the line, but for its weight."""
+    """Return each encounter's term in the ratio's numerator before weighting: the flag, in a sample
+    scaled up and corrected by its prediction.
+    """
     if stands_for is None:
         return flags
     result = stands_for * flags
     return result if predicted is None else result + (1.0 - stands_for) * predicted
 
 
-def redistribute_lost(stands_for: FloatArray, lost: Sequence[float], of: BoolArray) -> FloatArray:
-    """Return how many runs each run represents, where some that were flown gave no result.
+def redistribute_lost_runs(
+    stands_for: FloatArray, lost: Sequence[float], of: BoolArray
+) -> FloatArray:
+    """Return `stands_for` after sharing out, among the other flown runs of the cell, the runs that
+    flown runs without a result stood for.
 
     These leave out themselves, as in any study; the others for which they were to stand are shared
     by those flown `of` the same cell. `lost` says for how many each stood, NaN of one of which that
@@ -317,10 +330,10 @@ def redistribute_lost(stands_for: FloatArray, lost: Sequence[float], of: BoolArr
     return stands_for + others * more
 
 
-def _ratio_terms_by_cluster(
+def _sum_ratio_terms_by_cluster(
     weight: FloatArray, below: FloatArray, above: FloatArray, cluster: npt.ArrayLike | None
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the weight, and the terms below and above the line, of every independent cluster."""
+    """Return (weight, denominator term, numerator term) summed by cluster, if there are any."""
     each = weight, below, above
     if cluster is None:
         return each
@@ -363,17 +376,17 @@ def _checked_expansions(stands_for: npt.ArrayLike, count: int) -> FloatArray:
     return result
 
 
-def _flags_flown(mitigated: npt.ArrayLike, stands_for: FloatArray | None) -> FloatArray:
-    """Return the mitigated flags, 0 of those that were not flown."""
+def _checked_mitigated_flags(mitigated: npt.ArrayLike, stands_for: FloatArray | None) -> FloatArray:
+    """Return the mitigated flags, checked, with 0 for encounters that were not flown."""
     if stands_for is None:
         return _checked_flags("mitigated", mitigated)
     return _checked_flags("mitigated", np.where(stands_for > 0.0, mitigated, 0.0))
 
 
-def _count_events(
+def _count_nominal_mitigated_induced(
     nominal: FloatArray, mitigated: FloatArray, stands_for: FloatArray | None
 ) -> tuple[int, int, int]:
-    """Count encounters with the event nominally, mitigated, and mitigated more than nominally."""
+    """Return counts of encounters: nominal event, mitigated event, more mitigated than nominal."""
     induced = mitigated > nominal
     if stands_for is not None:
         induced &= stands_for > 0.0

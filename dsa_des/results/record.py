@@ -23,7 +23,7 @@ _Label = str | int | float
 
 
 class StrictRecord(BaseModel):
-    """What a file of ours holds: nothing is converted, and a number is finite."""
+    """Base of the records stored in files: values are not converted, and numbers must be finite."""
 
     model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
 
@@ -57,7 +57,7 @@ class ChangeWords(NamedTuple):
 
 @dataclass(frozen=True)
 class RatioOf:
-    """Which columns a ratio is made of.
+    """The columns and options from which a ratio of two events is computed.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ class RatioOf:
     only: tuple[str, str] | None = None
     share: bool = False
 
-    def reads(self) -> tuple[str, ...]:
+    def columns_read(self) -> tuple[str, ...]:
         """Return the names of all columns it reads."""
         names = (self.below, self.above, self.weight, self.cluster, self.only and self.only[0])
         return tuple(name for name in names if name)
@@ -139,19 +139,19 @@ class Result:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """What no value of it lies below or above; infinite where nothing is known."""
+        """(Smallest, largest) possible value of the result; infinite where none is known."""
         low = 0.0 if self.kind in (FRACTION, EVENT, SHARE, RATIO) else self.least
         high = 1.0 if self.kind in (FRACTION, EVENT, SHARE) else self.most
         return -math.inf if low is None else low, math.inf if high is None else high
 
     @property
     def is_summarised(self) -> bool:
-        """Whether a summary has a mean, a share or a ratio of it; names have none."""
+        """Whether the summary has the result's mean, share or ratio; not for classes and keys."""
         return self.kind not in (CLASS, KEY)
 
     @property
     def is_number(self) -> bool:
-        """Whether each run has a number of its own for it."""
+        """Whether each run has a number of its own as this result: not for ratios and classes."""
         return self.kind not in (RATIO, CLASS)
 
 
@@ -161,7 +161,7 @@ DONE, FAILED, CRASHED = "done", "failed", "crashed"
 
 @dataclass(frozen=True)
 class StopWhen:
-    """When a cell has enough replicas: half-width of a result's confidence interval."""
+    """Settings for stopping a cell: interval half-width to reach, and replicas between checks."""
 
     metric: str
     half_width: float
@@ -170,7 +170,7 @@ class StopWhen:
 
 @dataclass(frozen=True)
 class Requirement:
-    """A limit on a result, and the axis along which the cheapest value is looked for."""
+    """A limit on a result, and the axis whose cheapest value that meets it is wanted."""
 
     metric: str
     axis: str
@@ -216,7 +216,7 @@ FigureKind = Literal["axis", "heat", "map", "polar", "histogram", "cdf", "series
 
 
 class FigureRecord(StrictRecord):
-    """A figure; a study file says `limits` as ``limit``."""
+    """One figure of a study: its kind, result, axes and limits (``limit`` in a study file)."""
 
     kind: FigureKind
     metric: str | None = None
@@ -233,7 +233,7 @@ class FigureRecord(StrictRecord):
 
 
 class StudyHead(StrictRecord):
-    """Which study a folder holds."""
+    """File name and hash of the study that a folder holds."""
 
     #: The study's file.
     study: str
@@ -242,7 +242,7 @@ class StudyHead(StrictRecord):
 
 
 class StudyRecord(StudyHead):
-    """A study as its tables need it: what names something that is not there is refused."""
+    """What a study's tables need, as its folder stores it; names of missing columns are refused."""
 
     title: str
     scene: str
@@ -275,7 +275,7 @@ class StudyRecord(StudyHead):
         for result in self.results:
             if (result.kind == "ratio") != (result.ratio is not None):
                 raise ValueError("a ratio, and nothing else, says of which columns it is")
-            if result.ratio is not None and not set(result.ratio.reads()) <= {*columns}:
+            if result.ratio is not None and not set(result.ratio.columns_read()) <= {*columns}:
                 raise ValueError("a ratio names no column")
         if self.compare is not None and self.compare[0] not in axes:
             raise ValueError("compare names no axis")
@@ -299,8 +299,8 @@ class StudyRecord(StudyHead):
         return self
 
     def schema_of_parts(self) -> "pa.Schema":
-        """Return the columns of the study's parts."""
-        return columns_of(
+        """Return the Arrow schema of the study's part files."""
+        return part_schema(
             [(axis.column, axis.numeric) for axis in self.axes],
             [(draw.column, draw.numeric) for draw in self.draws],
             self.results,
@@ -309,17 +309,17 @@ class StudyRecord(StudyHead):
 
     @property
     def sample_columns(self) -> tuple[str, ...]:
-        """Columns of axes that are a sample."""
+        """Columns of the axes whose values are a sample of independent units."""
         return tuple(axis.column for axis in self.axes if axis.over)
 
     def command(self, row: Mapping[str, Any]) -> str:
         """Return the command that repeats the run of a row of the parts."""
-        return run_command(self.scene, int(row["seed"]), *self.changes(row))
+        return run_command(self.scene, int(row["seed"]), *self.swaps_and_sets(row))
 
-    def changes(
+    def swaps_and_sets(
         self, row: Mapping[str, Any]
     ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-        """Return the swaps and the values that make the scene of a run."""
+        """Return (swaps, set values), (name, value) pairs that make a row's scene of the base."""
         swaps, sets = list(self.swaps), list(self.sets)
         indices = np.unravel_index(int(row["cell"]), [len(axis.values) for axis in self.axes])
         for axis, index in zip(self.axes, indices, strict=True):
@@ -329,13 +329,13 @@ class StudyRecord(StudyHead):
         return swaps, sets
 
 
-def columns_of(
+def part_schema(
     axes: Sequence[tuple[str, bool]],
     draws: Sequence[tuple[str, bool]],
     results: Sequence[Result],
     geometry: Sequence[str] = (),
 ) -> "pa.Schema":
-    """Return the columns of a part; axes and draws are (column, whether it holds numbers).
+    """Return a part file's Arrow schema; axes and draws are (column, whether it holds numbers).
 
     Where only a sample of the runs is flown, each says for how many it stands, and by which
     geometry it was chosen.
@@ -363,15 +363,15 @@ def columns_of(
 
 
 def geometry_column(name: str) -> str:
-    """Return the column of a number by which runs are told apart before they are flown."""
+    """Return ``geometry.NAME``, the column of a quantity known of a run before it is flown."""
     return f"geometry.{name}"
 
 
 def predicted_column(event: str) -> str:
-    """Return the name, among those of geometry, of what an event counts before a run is flown."""
+    """Return ``predicted.EVENT``, the geometric quantity that predicts an event before flight."""
     return f"predicted.{event}"
 
 
 def draw_column(key: str) -> str:
-    """Return the column of a drawn value."""
+    """Return the column in the results of the drawn value of a scene key."""
     return f"draw.{key.removeprefix('blocks.')}"

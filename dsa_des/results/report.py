@@ -14,7 +14,7 @@ from typing import Any
 from jinja2 import Environment, StrictUndefined
 from markupsafe import Markup
 
-from dsa_des.files.sealed_files import read_regular
+from dsa_des.files.sealed_files import read_regular_file
 from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import AxisName, axis_label, readable_label, short_text, value_label
@@ -22,11 +22,16 @@ from dsa_des.results.models import (
     EffectRecord,
     MeasuredErrors,
     SceneRecord,
-    read_errors,
     read_explained,
+    read_model_errors,
     versions,
 )
-from dsa_des.results.printing import RATIO_HEADS, interval_text, ratio_cells, round_estimate
+from dsa_des.results.printing import (
+    RATIO_HEADS,
+    interval_text,
+    ratio_cells,
+    rounded_value_and_interval,
+)
 from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO
 from dsa_des.results.summary import Answer, Line, one_sided_confidence
 from dsa_des.results.tables import Tables, cut_off_text
@@ -41,17 +46,17 @@ _LONGEST = 400
 _MOST_SHOWN = 60
 
 
-def page_part(name: str) -> str:
-    """Return one of the templates of pages."""
+def read_page_template(name: str) -> str:
+    """Return the text of one of the report's HTML template files."""
     return (files("dsa_des.results") / "page" / name).read_text(encoding="utf-8")
 
 
 #: The beginning of a page that loads nothing, up to its body, and how its tables are written.
-PAGE_HEAD = page_part("head.html")
+PAGE_HEAD = read_page_template("head.html")
 
 
 def study_report(folder: StudyFolder) -> bytes:
-    """Return the page of a study's folder."""
+    """Return the HTML report of a study's folder, encoded as UTF-8."""
     tables = Tables(folder.record, folder)
     record, stored, first = tables.record, tables.rows.stored, tables.rows.stored.first
     explained = read_explained(folder)
@@ -61,11 +66,12 @@ def study_report(folder: StudyFolder) -> bytes:
     pictures = _figure_contents(folder)
     answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
     answering = answering or pictures[:1]
-    page = page_environment().from_string(PAGE_HEAD + page_part("study.html")).render(
+    template = PAGE_HEAD + read_page_template("study.html")
+    page = report_jinja_environment().from_string(template).render(
         title=record.title,
-        tables=tables, record=record, explained=explained, errors=read_errors(folder),
+        tables=tables, record=record, explained=explained, errors=read_model_errors(folder),
         explain=explain, most=_MOST_ROWS, runs=len(tables.rows.places) + tables.rows.failed,
-        version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_requested_rows(tables),
+        version=begun.get("dsa_des", now.get("dsa_des", "")), asked=_study_settings_rows(tables),
         axes=[
             (axis_label(AxisName(axis.column, axis.words)), ", ".join(map(_value_text,
             axis.values[:40]))
@@ -90,13 +96,14 @@ def study_report(folder: StudyFolder) -> bytes:
         level=f"{100 * record.confidence:g} %", methods=_interval_methods_text(tables),
         axis_heads=list(map(axis_label, tables.rows.axes)),
         ratio_heads=list(RATIO_HEADS), pivots=_requirement_tables(tables),
-        ratios=[(*map(_value_text, r.at), *ratio_cells(r)) for r in tables.ratios()[:_MOST_ROWS]],
+        ratios=[(*map(_value_text, r.at),
+        *ratio_cells(r)) for r in tables.ratio_lines()[:_MOST_ROWS]],
         sure=f"{100 * one_sided_confidence(record.confidence):g} %",
         others=[axis_label(n) for n in tables.rows.axes
                 if tables.baseline and n != tables.baseline[0]],
         differences=[
             (*map(_value_text, item.at), _value_text(item.value), _value_text(item.baseline),
-             readable_label(item.result.name), *round_estimate(item.difference.paired),
+             readable_label(item.result.name), *rounded_value_and_interval(item.difference.paired),
              item.difference.paired.count)
             for item in tables.compared[:_MOST_ROWS]
             if item.result in {line.result for line in tables.shown_lines()}
@@ -122,13 +129,13 @@ def study_report(folder: StudyFolder) -> bytes:
     return page.encode()
 
 
-def page_environment() -> Environment:
-    """Return the language of the page: whatever it is given is shown as text, on one line."""
+def report_jinja_environment() -> Environment:
+    """Return the Jinja environment of reports, which escapes values and shows each on one line."""
     environment = Environment(
         autoescape=True, finalize=_escaped_text, undefined=StrictUndefined, trim_blocks=True
     )
     environment.filters.update(
-        verbatim=_unchanged_lines,
+        verbatim=_preformatted_lines,
         filled=_drop_empty_columns,
         plain=Markup,
         axis=axis_label,
@@ -149,22 +156,22 @@ def _escaped_text(value: Any) -> Markup:
 def _drop_empty_columns(
     table: tuple[Iterable[Any], Iterable[Any]],
 ) -> tuple[list[Any], list[list[Any]]]:
-    """Return heads and rows of a table without the columns in which nothing stands."""
+    """Return (headings, rows) of a table without the columns whose cells are all empty."""
     heads, rows = list(table[0]), [list(row) for row in table[1]]
     kept = [k for k in range(len(heads)) if any(str(row[k]) for row in rows)]
     return [heads[k] for k in kept], [[row[k] for k in kept] for row in rows]
 
 
-def _unchanged_lines(lines: Iterable[str]) -> Markup:
-    """Return lines as they stand."""
+def _preformatted_lines(lines: Iterable[str]) -> Markup:
+    """Return lines, escaped, as an HTML ``pre`` element."""
     some = list(lines)[:_MOST_ROWS]
     return Markup("<pre>" + "\n".join(escape(printable(line)) for line in some) + "</pre>")
 
 
 def _summary_cells(line: Line, exact: bool = False) -> tuple[Any, ...]:
-    """Return one line of the summary as the cells of a row: rounded, or with the table's name."""
+    """Return a summary line's row: rounded to the interval, or if `exact` name and five digits."""
     e = line.estimate
-    said = (readable_label(line.result.name), *round_estimate(e))
+    said = (readable_label(line.result.name), *rounded_value_and_interval(e))
     if exact:
         said = (line.result.name, short_text(e.value), interval_text(e))
     return (
@@ -178,7 +185,7 @@ def _value_text(value: Any) -> str:
 
 
 def _interval_methods_text(tables: Tables) -> str:
-    """Return which interval belongs to which kind of result."""
+    """Return a text that says which interval method each kind of result in the tables has."""
     kinds = {line.result.kind for line in tables.lines}
     means = "studentised bootstrap" if tables.record.interval == "bootstrap" else "Student's t"
     known = {EVENT: "shares by Wilson's score", FRACTION: "fractions by Wilson's score",
@@ -191,7 +198,7 @@ def _interval_methods_text(tables: Tables) -> str:
 
 
 def _requirement_tables(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
-    """Return a table for each requirement, with the values of the last other axis side by side."""
+    """Return (title, headings, rows) per requirement, a column per value of the last other axis."""
     pivots = []
     for requirement in tables.record.requirements:
         mine = [one for one in tables.answers if one.requirement == requirement][:_MOST_ROWS]
@@ -201,12 +208,12 @@ def _requirement_tables(tables: Tables) -> list[tuple[str, list[str], list[list[
         along = tables.rows.axes[tables.rows.axes.index(requirement.axis)]
         title = f"{axis_label(along)} for {requirement.text()}"
         if not others:
-            pivots.append((title, ["cheapest"], [[_cheapest_texts(mine[0])]]))
+            pivots.append((title, ["cheapest"], [[_cheapest_value_text(mine[0])]]))
             continue
         columns = list(dict.fromkeys(one.at[-1] for one in mine))
         rows: dict[tuple[Any, ...], dict[Any, str]] = {}
         for one in mine:
-            rows.setdefault(one.at[:-1], {})[one.at[-1]] = _cheapest_texts(one)
+            rows.setdefault(one.at[:-1], {})[one.at[-1]] = _cheapest_value_text(one)
         heads = [axis_label(name) for name in others[:-1]]
         heads += [value_label(others[-1], column) for column in columns]
         pivots.append((title, heads, [
@@ -216,8 +223,10 @@ def _requirement_tables(tables: Tables) -> list[tuple[str, list[str], list[list[
     return pivots
 
 
-def _cheapest_texts(answer: Answer) -> str:
-    """Return the cheapest value that meets a requirement, and the one by the estimate alone."""
+def _cheapest_value_text(answer: Answer) -> str:
+    """Return the cheapest value that meets a requirement as text, with the one by the estimate
+    alone in brackets if it differs.
+    """
     sure = "none" if answer.value is None else _value_text(answer.value)
     alone = "none" if answer.estimated is None else _value_text(answer.estimated)
     notes = [f"({alone})"] if alone != sure else []
@@ -226,7 +235,7 @@ def _cheapest_texts(answer: Answer) -> str:
     return " ".join([sure, *notes])
 
 
-def _requested_rows(tables: Tables) -> list[tuple[str, Any]]:
+def _study_settings_rows(tables: Tables) -> list[tuple[str, Any]]:
     record = tables.record
     rows: list[tuple[str, Any]] = [
         ("replicas of each cell", record.replicas),
@@ -256,7 +265,7 @@ def _error_rows(errors: MeasuredErrors) -> list[tuple[Any, ...]]:
 
 
 def _effect_rows(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple[str, str, str]]:
-    """Return in which blocks each effect is simulated, or is not, for one reason."""
+    """Return (blocks, effect, reason) rows of effects simulated or not, blocks joined by reason."""
     together: dict[tuple[str, str], list[str]] = {}
     for e in effects:
         if e.simulated == simulated:
@@ -265,11 +274,11 @@ def _effect_rows(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple
 
 
 def _figure_contents(folder: StudyFolder) -> list[tuple[str, str, str]]:
-    """Return stem, name and content of the folder's figures."""
+    """Return (stem, file name, base64 content) of each PNG figure in the folder."""
     pictures = []
     for path in sorted(folder.path.glob("*.png"))[:_MOST_PICTURES]:
         try:
-            content = read_regular(path, _LARGEST_PICTURE)
+            content = read_regular_file(path, _LARGEST_PICTURE)
         except OSError:
             continue  # a link, or gone
         pictures.append((path.stem, path.name, base64.b64encode(content).decode()))
@@ -278,5 +287,5 @@ def _figure_contents(folder: StudyFolder) -> list[tuple[str, str, str]]:
 
 def _file_hashes(folder: StudyFolder) -> list[tuple[str, str]]:
     files = [folder.parts / f"{name}.parquet" for name in folder.part_names()[:_MOST_PARTS]]
-    hashes = [(file.name, hashlib.sha256(read_regular(file)).hexdigest()) for file in files]
+    hashes = [(file.name, hashlib.sha256(read_regular_file(file)).hexdigest()) for file in files]
     return [("study, with all that fixes its results", folder.record.study_sha256), *hashes]

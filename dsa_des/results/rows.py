@@ -18,13 +18,18 @@ from dsa_des.results.differences import (
     EstimatedDifference,
     RatioTerms,
     estimate_difference,
-    paired_units,
+    paired_unit_means,
     quantile_difference,
     ratio_as_estimate,
     ratio_difference,
 )
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.ratio import PairedRatio, paired_ratio, redistribute_lost, sampled_share
+from dsa_des.results.ratio import (
+    PairedRatio,
+    paired_ratio,
+    redistribute_lost_runs,
+    share_from_flown_sample,
+)
 from dsa_des.results.record import (
     CRASHED,
     EVENT,
@@ -42,7 +47,7 @@ from dsa_des.results.statistics import (
     estimate_bounded_mean,
     estimate_mean,
     estimate_quantile,
-    estimate_rare_mean,
+    estimate_rare_probability,
     estimate_share,
 )
 
@@ -62,7 +67,8 @@ _RESAMPLES = 2000
 
 
 class StoredRows:
-    """The rows with a result, in order of cell and replica, and what became of the others.
+    """The rows with a result in a study's folder, sorted by cell and replica, and how many of the
+    other runs failed and how.
 
     With `before_round` only those of earlier rounds.
     """
@@ -89,7 +95,7 @@ class StoredRows:
         return self._count
 
     def column(self, name: str) -> AnyArray:
-        """Return a column; missing numbers are NaN, missing texts None."""
+        """Return a column's values in rows with a result; missing numbers are NaN, texts None."""
         if name not in self._held:
             index = self.names.index(name)
             others = [n for n in self.names[index:] if n not in self._held]
@@ -98,7 +104,7 @@ class StoredRows:
         return self._held[name]
 
     def _read_columns(self, names: Sequence[str], *, look: bool) -> None:
-        """Read columns of all parts; `look` also at what became of the runs."""
+        """Read named columns of all parts; with `look`, count statuses, keep first failed runs."""
         while self._held and len(self._held) + len(names) > self._at_once:
             self._held.popitem(last=False)
         columns = None if look else [*names, "error"]
@@ -106,10 +112,10 @@ class StoredRows:
         for table in self._folder.each_part(self._before_round, columns):
             good = np.asarray(table["error"].is_null())
             if look:
-                self._look(table, good)
+                self._note_run_outcomes(table, good)
             kept = table if good.all() else table.filter(good)
             for name, result in pieces.items():
-                result.append(_codes(kept[name].combine_chunks()))
+                result.append(_dictionary_encode_texts(kept[name].combine_chunks()))
         if look:
             cell, replica = (_concatenate(pieces[name]) for name in _PLACE)
             self._count = len(cell)
@@ -119,7 +125,7 @@ class StoredRows:
             column = _concatenate(pieces.pop(name))
             self._held[name] = column if self._order is None else column[self._order]
 
-    def _look(self, table: "pa.Table", good: BoolArray) -> None:
+    def _note_run_outcomes(self, table: "pa.Table", good: BoolArray) -> None:
         self.status.update(table["status"].to_pylist())
         places = table.select(_PLACE).to_pydict()
         least = min(range(table.num_rows), key=lambda k: tuple(places[name][k] for name in _PLACE))
@@ -140,8 +146,8 @@ def _cell_and_replica(row: dict[str, Any]) -> tuple[int, int]:
     return row["cell"], row["replica"]
 
 
-def _codes(values: "pa.Array") -> Any:
-    """Return numbers as an array, texts as Arrow's codes of them: each text is held once."""
+def _dictionary_encode_texts(values: "pa.Array") -> Any:
+    """Return numbers as a NumPy array, and texts as a dictionary-encoded Arrow array."""
     import pyarrow as pa
 
     if pa.types.is_string(values.type):
@@ -161,7 +167,7 @@ def _concatenate(pieces: list[Any]) -> AnyArray:
 
 
 class Rows:
-    """The rows of a study as columns, and how they fall into places and units."""
+    """A study's rows as columns, grouped into places (axis values) and independent units."""
 
     def __init__(self, stored: StoredRows, axes: Sequence[str], over: Sequence[str]) -> None:
         self.stored = stored
@@ -175,32 +181,32 @@ class Rows:
         self.units = self._code_rows(self.over if self.over else ["replica"])
 
     @cached_property
-    def runs(self) -> IntArray:
-        """What rows share that are of the same replica of the same unit."""
+    def run_codes(self) -> IntArray:
+        """Code of each row's run: equal for rows of the same replica of the same unit."""
         replica: IntArray = self.column("replica")
         return self.units * (int(replica.max(initial=0)) + 1) + replica
 
     def column(self, name: str) -> AnyArray:
-        """Return a column; missing numbers are NaN."""
+        """Return the values of a column in all rows; missing numbers are NaN."""
         return self.stored.column(name)
 
     @cached_property
     def stands_for(self) -> FloatArray | None:
-        """For how many runs each one stands, 0 for one not flown; None where all are flown."""
+        """How many runs each row stands for in a sample, 0 if not flown; None if all are flown."""
         if STANDS_FOR not in self.stored.names:
             return None
         result = self.column(STANDS_FOR)
         for cell, lost in self.stored.unheard.items():
-            result = redistribute_lost(result, lost, self.column("cell") == cell)
+            result = redistribute_lost_runs(result, lost, self.column("cell") == cell)
         return result
 
     def predicted_events(self, event: str, rows: IntArray) -> FloatArray | None:
-        """Return with what an event counts in some rows before they are flown, if with anything."""
+        """Return what was predicted for an event in the rows before flight; None if nothing was."""
         name = geometry_column(predicted_column(event))
         return np.nan_to_num(self.column(name)[rows]) if name in self.stored.names else None
 
-    def is_sampled(self, name: str) -> bool:
-        """Return whether only runs that were flown have a result."""
+    def is_missing_unless_flown(self, name: str) -> bool:
+        """Return whether runs that were not flown lack a value in this column."""
         if self.stands_for is None:
             return False
         values = self.column(name)[self.stands_for == 0.0]
@@ -218,7 +224,7 @@ class Rows:
         return codes
 
     def each_place(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
-        """Return the axis values and the rows of every place, in order of first occurrence."""
+        """Yield (axis values, row indices) by combination of axis values, as they first occur."""
         order = np.argsort(self.places, kind="stable")
         _, starts = np.unique(self.places[order], return_index=True)
         groups = np.split(order, starts[1:]) if len(order) else []
@@ -229,7 +235,7 @@ class Rows:
     def comparisons_with_baseline(
         self, axis: str, baseline: Any
     ) -> Iterator[tuple[Any, tuple[Any, ...], IntArray, IntArray]]:
-        """Give each place off an axis's baseline that has a place there to be compared with.
+        """Yield combinations of axis values off `axis`'s baseline with a counterpart at it.
 
         Its value of the axis, those of the others, the rows at the baseline and its own.
         """
@@ -253,11 +259,11 @@ class Rows:
     def estimate(
         self, result: Result, rows: IntArray, confidence: float, method: str
     ) -> tuple[Estimate, int]:
-        """Return the estimate of a result over some rows, and how many rows have no value."""
+        """Return (estimate of a result, number of rows without a value) over the given rows."""
         if result.kind == RATIO:
             ratio, missing = self.ratio(result, rows, confidence, method)
             return ratio_as_estimate(ratio), missing
-        if self.is_sampled(result.name):
+        if self.is_missing_unless_flown(result.name):
             return self._estimate_sampled_share(result, rows, confidence)
         values = self.column(result.name)[rows].astype(float)
         missing = int(np.isnan(values).sum())
@@ -269,7 +275,7 @@ class Rows:
                 return estimate_bounded_mean(of_units, confidence), missing
             if result.unseen is not None:
                 more = self.mean_by_unit(result.unseen, rows)[1]
-                return estimate_rare_mean(of_units, more, confidence), missing
+                return estimate_rare_probability(of_units, more, confidence), missing
             return estimate_mean(of_units, confidence, method), missing
         trials = np.ones(len(rows))
         if result.kind == SHARE:
@@ -283,11 +289,11 @@ class Rows:
     def _estimate_sampled_share(
         self, result: Result, rows: IntArray, confidence: float
     ) -> tuple[Estimate, int]:
-        """Return how often an event happens of which only some runs, drawn for it, know."""
+        """Return the share of runs with an event only flown ones know; how many lack a value."""
         assert self.stands_for is not None
         values, stands_for = self.column(result.name)[rows].astype(float), self.stands_for[rows]
         known = ~np.isnan(values) | (stands_for == 0.0)
-        ratio = sampled_share(
+        ratio = share_from_flown_sample(
             np.ones(int(known.sum())), values[known], np.ones(int(known.sum())),
             stands_for[known], cluster=self.units[rows][known],
             predicted=self.predicted_events(result.name, rows[known]), confidence=confidence,
@@ -297,7 +303,7 @@ class Rows:
     def ratio(
         self, result: Result, rows: IntArray, confidence: float, method: str
     ) -> tuple[PairedRatio, int]:
-        """Return the ratio of some rows, and how many of them have no value for it.
+        """Return (ratio, number of rows without a value) over the given rows.
 
         Runs of the same encounter, and of the same unit, hang together.
         """
@@ -311,7 +317,7 @@ class Rows:
         }  # fmt: skip
         is_share = result.ratio is not None and result.ratio.share
         if is_share and stands_for is not None:
-            return sampled_share(below, above, weight, stands_for, **options), missing
+            return share_from_flown_sample(below, above, weight, stands_for, **options), missing
         ratio = paired_ratio(below, above, weight, stands_for=stands_for, **options)
         if is_share:
             low, high = ratio.interval
@@ -319,7 +325,7 @@ class Rows:
         return ratio, missing
 
     def _ratio_terms(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
-        """Return the columns of a ratio over the rows that have all of them, and those rows."""
+        """Return a ratio's columns over rows that have all, those rows, and how many lack one."""
         of = result.ratio
         assert of is not None
         if of.only is not None:
@@ -342,23 +348,25 @@ class Rows:
         terms = RatioTerms(below, above, weight, cluster, stands_for, predicted).select_runs(known)
         return terms, rows[known], int((~known).sum())
 
-    def common(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
-        """Return the rows, of two sets of them, of the runs that both have, in pairs."""
-        runs = self.runs
+    def pair_rows_by_run(self, first: IntArray, second: IntArray) -> tuple[IntArray, IntArray]:
+        """Return rows of `first` and rows of `second` that belong to the same runs, in pairs."""
+        runs = self.run_codes
         _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
         return first[here], second[there]
 
     def paired_values(
         self, name: str, first: IntArray, second: IntArray
     ) -> tuple[IntArray, FloatArray, FloatArray]:
-        """Return the units that both sets of rows have, and the values of each in both."""
-        values, (one, two) = self.column(name), self.common(first, second)
-        return paired_units(self.units[one], values[one].astype(float), values[two].astype(float))
+        """Return (units, values in `first`, values in `second`): unit means over common runs."""
+        values, (one, two) = self.column(name), self.pair_rows_by_run(first, second)
+        return paired_unit_means(
+            self.units[one], values[one].astype(float), values[two].astype(float)
+        )
 
     def difference(
         self, result: Result, first: IntArray, second: IntArray, confidence: float, method: str
     ) -> EstimatedDifference:
-        """Return how a result differs between two conditions, on the runs that both have."""
+        """Return a result's difference, `second` minus `first`, over runs that both have."""
         if result.kind == RATIO:
             return self._ratio_difference(result, first, second, confidence)
         _, one, two = self.paired_values(result.name, first, second)
@@ -372,12 +380,14 @@ class Rows:
         (one, mine, _), (two, other, _) = (
             self._ratio_terms(result, rows) for rows in (first, second)
         )
-        _, here, there = np.intersect1d(self.runs[mine], self.runs[other], return_indices=True)
+        _, here, there = np.intersect1d(
+            self.run_codes[mine], self.run_codes[other], return_indices=True
+        )
         alone = len(mine) - len(here), len(other) - len(there)
         return ratio_difference(one.select_runs(here), two.select_runs(there), alone, confidence)
 
-    def cut_off(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
-        """Return where the run cut a result off in some rows, and in how many, sorted."""
+    def cut_off_counts(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
+        """Return sorted (where, number of rows) for the rows whose run cut the result off."""
         if result.cut_off is None:
             return ()
         said = [where for where in self.column(result.cut_off)[rows].tolist() if where is not None]

@@ -23,7 +23,7 @@ _MOST_LOG = 700.0
 
 @dataclass(frozen=True)
 class Estimate:
-    """A mean or a share, and its interval."""
+    """A mean, share, quantile or other estimate with its interval."""
 
     #: NaN where there are too few values to say.
     value: float
@@ -41,7 +41,7 @@ class Estimate:
 
 
 def clip_estimate(result: Estimate, least: float | None, most: float | None) -> Estimate:
-    """Return an estimate whose interval holds nothing that no value can be."""
+    """Return the estimate with its interval cut to the possible values, `least` to `most`."""
     low = result.low if least is None else max(least, result.low)
     high = result.high if most is None else min(most, result.high)
     # A NaN is kept: the comparison with it is false.
@@ -49,7 +49,7 @@ def clip_estimate(result: Estimate, least: float | None, most: float | None) -> 
 
 
 def wilson_interval(successes: float, trials: float, confidence: float) -> tuple[float, float]:
-    """Return Wilson's score interval of a share.
+    """Return (low, high) of Wilson's score interval for a share.
 
     Trials may be an effective number, and need not be whole.
 
@@ -59,7 +59,7 @@ def wilson_interval(successes: float, trials: float, confidence: float) -> tuple
     """
     if trials <= 0:
         return math.nan, math.nan
-    z = normal_quantile(confidence)
+    z = two_sided_normal_quantile(confidence)
     share = successes / trials
     middle = (share + z * z / (2.0 * trials)) / (1.0 + z * z / trials)
     spread = share * (1.0 - share) / trials + z * z / (4.0 * trials * trials)
@@ -69,13 +69,13 @@ def wilson_interval(successes: float, trials: float, confidence: float) -> tuple
     return low, high
 
 
-def normal_quantile(confidence: float) -> float:
-    """Return the two-sided quantile of the normal distribution."""
+def two_sided_normal_quantile(confidence: float) -> float:
+    """Return the central normal interval's half-width in standard deviations: 1.96 for 0.95."""
     return NormalDist().inv_cdf(0.5 + confidence / 2.0)
 
 
 def estimate_share(successes: FloatArray, trials: FloatArray, confidence: float) -> Estimate:
-    """Return a share over independent units, each with trials that may hang together.
+    """Return the share of successes over independent units; trials may correlate within a unit.
 
     The interval is Wilson's with the effective number of trials: units that differ more from each
     other than chance allows count for less (Rao and Scott, "A simple method for the analysis of
@@ -100,7 +100,9 @@ def estimate_share(successes: FloatArray, trials: FloatArray, confidence: float)
         residuals = successes - value * trials
         spread = units / (units - 1) * math.fsum(residuals**2) / total**2
         if clustered:
-            spread *= (t_quantile(units - 1, confidence) / normal_quantile(confidence)) ** 2
+            spread *= (
+                two_sided_t_quantile(units - 1, confidence) / two_sided_normal_quantile(confidence)
+            ) ** 2
         effective = total / max(1.0, spread / plain)
     elif clustered:
         effective = float(units)
@@ -110,13 +112,13 @@ def estimate_share(successes: FloatArray, trials: FloatArray, confidence: float)
 
 
 def _has_few_units(successes: FloatArray, trials: FloatArray) -> bool:
-    """Return whether few units say how trials hang together: few in all, or few unlike the rest."""
+    """Return whether the interval has too few units: in all, or with a success, or a failure."""
     unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
     return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
 
 
 def estimate_mean(values: FloatArray, confidence: float, method: str = "t") -> Estimate:
-    """Return the mean of independent values; NaN ones are left out.
+    """Return the mean of independent values with its interval; NaN values are left out.
 
     `method` is "t" or "bootstrap": Student's t, or the studentised bootstrap over 2000 resamples
     (always the same ones), which leans to the side of the longer tail (Efron and Tibshirani, "An
@@ -131,14 +133,14 @@ def estimate_mean(values: FloatArray, confidence: float, method: str = "t") -> E
     if count == 1:
         return Estimate(value, math.nan, math.nan, 1, True)
     error = standard_error(values)
-    below = above = t_quantile(count - 1, confidence)
+    below = above = two_sided_t_quantile(count - 1, confidence)
     if method == "bootstrap":
         below, above = _bootstrap_reach(part, confidence) or (below, above)
     low, high = value - below * error, value + above * error
     return Estimate(value, low, high, count, count < FEW)
 
 
-def estimate_rare_mean(values: FloatArray, more: FloatArray, confidence: float) -> Estimate:
+def estimate_rare_probability(values: FloatArray, more: FloatArray, confidence: float) -> Estimate:
     """Return the mean of independent estimates of one rare probability; NaN ones are left out.
 
     Such estimates are products, and skewed: the interval is that of Student's t for the logarithm
@@ -152,7 +154,10 @@ def estimate_rare_mean(values: FloatArray, more: FloatArray, confidence: float) 
     if plain.value > 0.0:
         relative = plain.half_width / plain.value
         factor = math.exp(min(relative, _MOST_LOG))
-        few = plain.few or FEW * (relative / t_quantile(plain.count - 1, confidence)) ** 2 > 1.0
+        few = (
+            plain.few
+            or FEW * (relative / two_sided_t_quantile(plain.count - 1, confidence)) ** 2 > 1.0
+        )
         return replace(
             plain, low=plain.value / factor, high=min(1.0, plain.value * factor), few=few
         )
@@ -162,7 +167,7 @@ def estimate_rare_mean(values: FloatArray, more: FloatArray, confidence: float) 
 
 
 def estimate_quantile(values: FloatArray, share: float, confidence: float) -> Estimate:
-    """Return a quantile over independent units, whose interval lies between two order statistics.
+    """Return the quantile `share` over independent units, with two order statistics as interval.
 
     Either end errs with at most half the probability that is left (H. A. David and H. N. Nagaraja,
     "Order statistics", 3rd edition, 2003, section 7.1). Of too few units an end is infinite.
@@ -194,7 +199,7 @@ def estimate_bounded_mean(values: FloatArray, confidence: float) -> Estimate:
     plain = estimate_mean(values, confidence)
     if plain.count < 2:
         return plain
-    error = normal_error(plain, confidence)
+    error = standard_error_from_interval(plain, confidence)
     spread = plain.value * (1.0 - plain.value)
     trials = spread / error**2 if spread > 0.0 and error > 1e-9 else float(plain.count)
     low, high = wilson_interval(plain.value * trials, trials, confidence)
@@ -204,14 +209,14 @@ def estimate_bounded_mean(values: FloatArray, confidence: float) -> Estimate:
 def normal_estimate(
     value: float, error: float, count: int, few: bool, confidence: float
 ) -> Estimate:
-    """Return an estimate whose interval is that of the normal distribution."""
-    half = normal_quantile(confidence) * error
+    """Return an estimate with the normal interval of a given standard error."""
+    half = two_sided_normal_quantile(confidence) * error
     return Estimate(value, value - half, value + half, count, few)
 
 
-def normal_error(estimate: Estimate, confidence: float) -> float:
-    """Return the standard error whose normal interval is as wide as an estimate's."""
-    return estimate.half_width / normal_quantile(confidence)
+def standard_error_from_interval(estimate: Estimate, confidence: float) -> float:
+    """Return the standard error whose normal interval is as wide as the estimate's."""
+    return estimate.half_width / two_sided_normal_quantile(confidence)
 
 
 def standard_error(values: FloatArray) -> float:
@@ -224,7 +229,7 @@ def standard_error(values: FloatArray) -> float:
 
 
 def scale_by_power_of_two(values: FloatArray) -> tuple[FloatArray, int]:
-    """Return values divided by a power of two, the largest then below 1, and its exponent.
+    """Return (values, exponent): divided by a power of two so that the largest lies below 1.
 
     The division is exact, so what is computed of them has the same digits; but sums and squares of
     values near the largest number there is are numbers then.
@@ -234,15 +239,15 @@ def scale_by_power_of_two(values: FloatArray) -> tuple[FloatArray, int]:
     return np.ldexp(values, -exponent), exponent
 
 
-def t_quantile(degrees: float, confidence: float) -> float:
-    """Return the two-sided quantile of Student's t."""
+def two_sided_t_quantile(degrees: float, confidence: float) -> float:
+    """Return the half-width, in standard errors, of the central interval of Student's t."""
     from scipy.special import stdtrit
 
     return float(stdtrit(degrees, 0.5 + confidence / 2.0))
 
 
 def _bootstrap_reach(values: FloatArray, confidence: float) -> tuple[float, float] | None:
-    """Return how many standard errors an interval reaches below and above the mean.
+    """Return how many standard errors the studentised bootstrap reaches (below, above) the mean.
 
     None where most resamples hold one value only, so that they tell nothing.
     """
@@ -265,7 +270,7 @@ def _bootstrap_reach(values: FloatArray, confidence: float) -> tuple[float, floa
 
 
 def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float]:
-    """Return the interval that holds a chi-square variable with a probability, tails alike."""
+    """Return (low, high) that hold a chi-square variable with probability `share`, equal tails."""
     from scipy.special import gammaincinv
 
     tail = 0.5 * (1.0 - share)
@@ -274,13 +279,15 @@ def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float
 
 
 def unseen_event_moments(terms: FloatArray) -> tuple[float, float]:
-    """Return what one event more adds to a weighted sum, on average, and to its variance."""
+    """Return the mean and the mean square of one more event's term, drawn in proportion to the
+    terms: what it adds to a Poisson sum and its variance.
+    """
     once = math.fsum(terms)
     return math.fsum(terms**2) / once, math.fsum(terms**3) / once
 
 
 def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed: int) -> FloatArray:
-    """Return ratios of the sums of two terms over sets of units drawn with replacement.
+    """Return sum `above` / sum `below` for bootstrap resamples of units, except without `below`.
 
     Units without any event are drawn together: they add nothing to either sum. Those that are
     alike in both sums are too, which leaves few kinds where weights repeat.
@@ -306,7 +313,7 @@ def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed:
 def gamma_interval(
     below: FloatArray, above: FloatArray, ratio: float, tail: float
 ) -> tuple[float, float]:
-    """Return the ends of an interval of which either errs with a probability of at most `tail`.
+    """Return (low, high) of a ratio's interval; each end errs with probability `tail` at most.
 
     `below` and `above` are the clusters' terms below and above the line.
 
@@ -334,7 +341,9 @@ def gamma_interval(
     last = np.concatenate([np.cumsum(moments[:, ::-1], axis=1)[:, ::-1], np.zeros((5, 1))], axis=1)
 
     def sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Return the terms that went and those that stay: their sums and their squares'."""
+        """Return (sum, sum of squares) of the terms ``y - limit * x`` that are negative, with the
+        sign turned, and of those that are positive.
+        """
         index = int(np.searchsorted(each, limit))
         went, stay = (part[:, index].tolist() for part in (first, last))
         return (
@@ -345,7 +354,7 @@ def gamma_interval(
     more, heaviest = unseen_event_moments(np.maximum(x, y)), float(x.max())
 
     def confidence_below(limit: float) -> float:
-        """Return how sure it is that the ratio is below a limit."""
+        """Return the confidence that the ratio is below `limit`."""
         went, stay = sums(limit)
         return _probability_of_more(went, (stay[0] + more[0], stay[1] + more[1]))
 
@@ -360,7 +369,7 @@ def gamma_interval(
 
 
 def _probability_of_more(one: tuple[float, float], other: tuple[float, float]) -> float:
-    """Return the probability that a gamma variable is larger than another: means and variances."""
+    """Return the probability that gamma variable `one` exceeds `other`, each (mean, variance)."""
     from scipy.special import betainc
 
     if not (one[0] > 0.0 and one[1] > 0.0):
@@ -373,7 +382,9 @@ def _probability_of_more(one: tuple[float, float], other: tuple[float, float]) -
 def _bisect_ratio(
     certainty: Callable[[float], float], sure: float, start: float, factor: float
 ) -> float:
-    """Return the ratio from which on a limit further out is sure, by halving its logarithm."""
+    """Return the ratio at which `certainty` reaches `sure`: steps by `factor` away from `start`,
+    then bisection in the logarithm.
+    """
     inner = outer = start
     while certainty(outer) < sure:
         if not 1e-300 < outer < 1e300:

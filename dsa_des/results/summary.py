@@ -21,7 +21,7 @@ from dsa_des.results.statistics import Estimate, clip_estimate
 
 @dataclass(frozen=True)
 class Line:
-    """One result at one combination of the summary's axis values."""
+    """The estimate of one result at one combination of the axis values of a summary."""
 
     at: tuple[Any, ...]
     result: Result
@@ -43,7 +43,7 @@ def summarise(
     method: str,
     expected: Mapping[tuple[str, tuple[Any, ...]], float],
 ) -> list[Line]:
-    """Return one line per combination of axis values and result."""
+    """Return lines with estimates of all summarised results per combination of axis values."""
     lines = []
     for at, chosen in rows.each_place():
         for result in results:
@@ -62,7 +62,7 @@ def summarise(
                 estimate, missing = rows.estimate(result, chosen, confidence, method)
                 estimate = clip_estimate(estimate, result.least, result.most)
             known = expected.get((result.name, at))
-            cut_off = rows.cut_off(result, chosen)
+            cut_off = rows.cut_off_counts(result, chosen)
             lines.append(
                 Line(at, result, estimate, missing, known, len(chosen), cut_off, ratio, other)
             )
@@ -71,7 +71,7 @@ def summarise(
 
 @dataclass(frozen=True)
 class Compared:
-    """A result at one value of the compared axis, less the same at the baseline."""
+    """The difference of a result between one value of the compared axis and its baseline."""
 
     at: tuple[Any, ...]
     value: Any
@@ -86,7 +86,7 @@ def compare_axis(
     rows: Rows, axis: str, baseline: Any, results: Sequence[Result], confidence: float,
     method: str, weight: str | None = None,
 ) -> list[Compared]:  # fmt: skip
-    """Return the paired differences of every value of an axis against one of them.
+    """Return paired differences of results between each other value of an axis and its baseline.
 
     Rows are paired that share the unit and the values of all other axes. `weight` names the result
     that weighs units in ratios of events.
@@ -96,7 +96,7 @@ def compare_axis(
         for result in results:
             if not result.is_summarised or result.quantile is not None:
                 continue  # paired differences are of means
-            if result.kind != RATIO and rows.is_sampled(result.name):
+            if result.kind != RATIO and rows.is_missing_unless_flown(result.name):
                 continue  # other runs were flown here than there
             change = rows.difference(result, base, chosen, confidence, method)
             ratio = None
@@ -109,7 +109,7 @@ def compare_axis(
 def _event_ratio(
     rows: Rows, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
 ) -> PairedRatio:
-    """Return how often an event happens in some rows, by how often in others: run by run.
+    """Return how often an event happens in some rows divided by others, over the same runs.
 
     Rows `first` are below the line, `second` above; runs that only one has do not count. The
     result `weight` says how often each unit happens.
@@ -120,7 +120,7 @@ def _event_ratio(
         if weight is not None:
             known &= ~np.isnan(rows.column(weight)[side].astype(float))
         sides.append(side[known])
-    below, above = rows.common(*sides)
+    below, above = rows.pair_rows_by_run(*sides)
     weights = None if weight is None else rows.column(weight)[below].astype(float)
     return paired_ratio(
         rows.column(name)[below].astype(float), rows.column(name)[above].astype(float),
@@ -130,7 +130,7 @@ def _event_ratio(
 
 @dataclass(frozen=True)
 class Answer:
-    """The cheapest value at one combination of the other axes' values."""
+    """The cheapest value that meets a requirement at one combination of the other axes' values."""
 
     requirement: Requirement
     #: Values of the other axes.
@@ -148,7 +148,7 @@ class Answer:
 def cheapest_values(
     requirement: Requirement, axes: Sequence[str], lines: Sequence[Line]
 ) -> list[Answer]:
-    """Return the cheapest value at every combination of the other axes' values."""
+    """Return the cheapest value that meets the requirement, by combination of the other axes."""
     if requirement.axis not in axes:
         return []
     index = list(axes).index(requirement.axis)
@@ -186,11 +186,11 @@ def _count_leading(good: Sequence[bool]) -> int:
 
 
 def one_sided_confidence(confidence: float) -> float:
-    """Return how sure one end of a two-sided interval is."""
+    """Return the confidence of one end alone of a two-sided interval: 0.975 for 0.95."""
     return 0.5 + confidence / 2.0
 
 
-def results_of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
+def result_numbers_of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
     """Return the results ``METRIC.5``, ``METRIC.10`` ... with the number of each, ascending."""
     numbers = {}
     for name in names:

@@ -63,7 +63,7 @@ class Tables:
             )  # fmt: skip
 
     def _analytic_answers(self) -> dict[tuple[str, tuple[Any, ...]], float]:
-        """Return the analytic answers that the folder's summary holds."""
+        """Return (result, axis values) → analytic answer, from the summary in the folder."""
         table = self.folder.table(SUMMARY)
         if table is None or not {*self.rows.axes, "result", "expected"} <= set(table.column_names):
             return {}
@@ -75,7 +75,7 @@ class Tables:
         return expected
 
     def shown_lines(self, only: Sequence[str] = ()) -> list[Line]:
-        """Return the lines of some results; by default those the study draws or waits for."""
+        """Return summary lines of the named results, else those of figures or stop rule, or all."""
         wanted = set(only) or {f.metric for f in self.record.figures if f.metric is not None}
         if self.record.stop_when is not None and not only:
             wanted.add(self.record.stop_when.metric)
@@ -93,18 +93,18 @@ class Tables:
         self.folder.write_table(SUMMARY, _parquet(self._summary_columns()))
         if self.compared:
             self.folder.write_table(DIFFERENCES, _parquet(self._difference_columns()))
-        if self.ratios():
+        if self.ratio_lines():
             self.folder.write_table(RATIOS, _parquet(self._ratio_columns()))
         if self.answers:
             self.folder.write_table(REQUIREMENTS, _parquet(self._answer_columns()))
 
-    def ratios(self) -> list[Line]:
+    def ratio_lines(self) -> list[Line]:
         """Return the lines that are ratios of events."""
         return [line for line in self.lines if line.ratio is not None]
 
     def _ratio_columns(self) -> dict[str, list[Any]]:
-        """Return all numbers of the ratios, with both kinds of interval."""
-        lines = self.ratios()
+        """Return the columns of the ratio table, with gamma and bootstrap intervals for each."""
+        lines = self.ratio_lines()
         columns = _axis_value_columns(self.rows.axes, lines) | _columns_at_paths(
             lines, result="result.name"
         )
@@ -181,7 +181,9 @@ class Tables:
         }  # fmt: skip
 
     def notable_results(self, only: Sequence[str] = ()) -> list[str]:
-        """Return the results worth a closer look: those named, drawn, or else that differ."""
+        """Return the names of results to draw as scatters: those given, or else those in figures,
+        or else those that differ from the baseline.
+        """
         drawn = [f.metric for f in self.record.figures if f.metric is not None]
         if only or drawn:
             numbers = {result.name for result in self.results if result.is_number}
@@ -193,19 +195,21 @@ class Tables:
 
 
 def cut_off_text(line: Line) -> str:
-    """Return ``12 of 200 at the start, 3 never``; nothing where the run cut nothing off."""
+    """Return where the run cut a result off and how often: ``12 of 200 at the start, 3 never``;
+    empty if nowhere.
+    """
     texts = [f"{many:,} {shorten(where)}" for where, many in line.cut_off]
     texts[:1] = [text.replace(" ", f" of {line.runs:,} ", 1) for text in texts[:1]]
     return ", ".join(texts)
 
 
 def _axis_value_columns(axes: Sequence[str], items: Sequence[Any]) -> dict[str, list[Any]]:
-    """Return the values of some axes at items that are `at` them."""
+    """Return axis → its value in each item, from the item's `at`."""
     return {name: [item.at[k] for item in items] for k, name in enumerate(axes)}
 
 
 def _columns_at_paths(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
-    """Return columns of the values at dotted paths in items; None behind what is None."""
+    """Return column → value at a dotted attribute path in each item; None where a step is None."""
     return {name: [_value_at(item, path) for item in items] for name, path in paths.items()}
 
 

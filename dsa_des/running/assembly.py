@@ -19,7 +19,7 @@ from dsa_des.time.clock import MAX_TICK
 
 
 class Assembly:
-    """The blocks of a scene, ready to run, in each stretch of time.
+    """Builds and sets up a scene's block instances for each stretch between timed changes.
 
     Where something changes while the scene runs, `stretches` are the blocks of each stretch. A
     block goes on as it is unless its own parameters, the scene's sections or what its neighbours
@@ -46,9 +46,9 @@ class Assembly:
         #: The blocks of each stretch, the first one that of the start.
         self.stretches: list[dict[str, Component]] = [{} for _ in self._scenes]
         for number in range(len(self._scenes)):
-            self._build(number)
+            self._build_stretch(number)
         self.components = self.stretches[0]
-        self.duration_s = self._duration()
+        self.duration_s = self._duration_s()
         self._refuse_late_changes()
         #: Blocks that move what carries others, and the names of that.
         self._sources = {n: names for n, c in self.components.items() if (names := c.platforms())}
@@ -57,20 +57,20 @@ class Assembly:
         #: these say otherwise: they do not say what they remember.
         self.unheard: dict[str, int] = {}
         for number in range(len(self._scenes)):
-            self._offer_down_the_chain(number)
+            self._pass_offers_downstream(number)
         #: What became of the effects of each stretch.
         self.plans = self._plan_effects(wrap_effect)
         self._set_up()
 
-    def _build(self, number: int) -> None:
+    def _build_stretch(self, number: int) -> None:
         components = self.stretches[number]
         before = self.stretches[number - 1] if number else {}
         problems: list[Problem] = []
         for name in self._scenes[number].blocks:
             if number:
                 components[name] = before[name]
-            if not number or self._differs(name, number):
-                with self._preparing(name, problems):
+            if not number or self._has_changed_in_stretch(name, number):
+                with self._naming_failed_block(name, problems):
                     made = self._make_component(name, number)
                     if number and made.heeds_changes:
                         from_s = self._scene.stretches[number - 1].from_s
@@ -79,14 +79,18 @@ class Assembly:
                         components[name] = made
         _raise_if_problems(problems)
 
-    def _differs(self, name: str, number: int) -> bool:
-        """Return whether a block's parameters, or sections, are others than in the last stretch."""
+    def _has_changed_in_stretch(self, name: str, number: int) -> bool:
+        """Return whether a block's parameters, or the scene's sections, differ from the stretch
+        before; SceneError if the block cannot change.
+        """
         scene, before = self._scenes[number], self._scenes[number - 1]
         block, old = scene.blocks[name], before.blocks[name]
         if block.parameters is not old.parameters and block.parameters != old.parameters:
             heeds = block.cls.remembers is not None or block.cls.heeds_changes
             if block.cls is not old.cls or not heeds:
-                message = f"cannot change while a run lasts: {block.cls.path()} is made anew by it"
+                message = (
+                    f"cannot change while a run lasts: {block.cls.import_path()} is made anew by it"
+                )
                 raise SceneError([self._scene.problem(f"blocks.{name}", message)])
             return True
         return block.cls.remembers is not None and scene.sections != before.sections
@@ -106,7 +110,7 @@ class Assembly:
         parameters = block.parameters if number else timeline.parameters(name)
         return block.cls(name, parameters, context)
 
-    def _duration(self) -> Fraction:
+    def _duration_s(self) -> Fraction:
         if self._scene.duration_s is not None:
             return self._scene.duration_s
         lengths = [self._call_method(one, "natural_duration_s") for one in self.components.values()]
@@ -128,7 +132,7 @@ class Assembly:
                 raise SceneError([self._scene.problem("changes", message)])
 
     def _assign_platforms(self) -> None:
-        """Tell every block what carries it, which no change alters."""
+        """Set the platform (aircraft or place) of all block instances; timed changes keep it."""
         self.platforms = platform_by_block(self._scene, self._sources)
         on, first = set(self.platforms.values()), {names[0] for names in self._sources.values()}
         #: Whether blocks are on several platforms, or on another one than the first.
@@ -137,8 +141,8 @@ class Assembly:
             for name, platform in self.platforms.items():
                 components[name].context.platform = platform
 
-    def _offer_down_the_chain(self, number: int) -> None:
-        """Tell every block what its producers offer, sources first: a block may pass it on.
+    def _pass_offers_downstream(self, number: int) -> None:
+        """Give every block its producers with what each offers, sources first as offers pass on.
 
         It comes before effects are planned, so that a verdict may rest on it.
         """
@@ -148,7 +152,7 @@ class Assembly:
                 Producer(
                     wire.source,
                     wire.input,
-                    self._offer(wire, components),
+                    self._offer_over_wire(wire, components),
                     wire.total_delay_s + Fraction(wire.jitter_s),
                     Fraction(wire.jitter_s),
                     wire.queued or wire.delay_scans > 0,
@@ -165,14 +169,14 @@ class Assembly:
                     self.unheard.setdefault(name, number)
                     continue
                 problems: list[Problem] = []
-                with self._preparing(name, problems):
+                with self._naming_failed_block(name, problems):
                     components[name] = self._make_component(name, number)
                 _raise_if_problems(problems)
                 components[name].context.platform = told_by.context.platform
             components[name].context.producers = producers
 
-    def _offer(self, wire: Wire, components: Mapping[str, Component]) -> Any:
-        """Return what is offered over a wire, as what carries the receiver has it."""
+    def _offer_over_wire(self, wire: Wire, components: Mapping[str, Component]) -> Any:
+        """Return what a wire's sender offers as seen from the receiver's platform; None if none."""
         offer = self._call_method(components[wire.source], "offer", wire.output)
         carrying = components[wire.target].context.platform
         if offer is not None and carrying in self._sources.get(wire.source, ()):
@@ -180,11 +184,11 @@ class Assembly:
         return offer
 
     def _instances_of(self, name: str) -> list[Component]:
-        """Return the instances of a block, each once, in order of time."""
+        """Return the distinct instances of a block over all stretches, in order of time."""
         return list({id(of[name]): of[name] for of in self.stretches}.values())
 
     def _plan_effects(self, wrap: WrapEffect | None) -> list[list[Planned]]:
-        """Decide which effects exist in each stretch and build them."""
+        """Decide the effects simulated in each stretch, build them in, and return the decisions."""
         planned: dict[int, list[Planned]] = {}
         problems: list[Problem] = []
         for component in (one for of in self.stretches for one in of.values()):
@@ -195,7 +199,7 @@ class Assembly:
                 if id(component) in planned:
                     continue
                 planned[id(component)] = []
-                with self._preparing(name, problems):
+                with self._naming_failed_block(name, problems):
                     planned[id(component)] = build_effects(
                         component, tolerance, everything=self._everything, wrap=wrap
                     )
@@ -212,7 +216,7 @@ class Assembly:
             each = self._instances_of(name)
             for component in each:
                 component.context.consumers = consumers
-                with self._preparing(name, problems):
+                with self._naming_failed_block(name, problems):
                     component.setup()
             for component in each[1:] if not problems else ():
                 if [*component.records()] != [*each[0].records()]:
@@ -221,7 +225,7 @@ class Assembly:
         _raise_if_problems(problems)
 
     def _consumers(self, name: str) -> list[Consumer]:
-        """Return the blocks that a block feeds, with all that each of them asks."""
+        """Return a `Consumer` per input that a block feeds: receiver's platform and request."""
         consumers: list[Consumer] = []
         for wire in self._scene.wires:
             if wire.source == name:
@@ -236,8 +240,8 @@ class Assembly:
         return consumers
 
     @contextmanager
-    def _preparing(self, name: str, problems: list[Problem]) -> Iterator[None]:
-        """Make what a block raises before the run an error that names it."""
+    def _naming_failed_block(self, name: str, problems: list[Problem]) -> Iterator[None]:
+        """Turn a block's error before the run into a problem or SetupFailure that names it."""
         try:
             yield
         except (SceneError, BlockFailure, RunRefused):
@@ -247,21 +251,21 @@ class Assembly:
         except BaseException as error:
             if is_stop_request(error):
                 raise
-            path = self._scene.blocks[name].cls.path()
+            path = self._scene.blocks[name].cls.import_path()
             raise SetupFailure(name, path, 0.0, None, error_with_kind(error)) from error
 
     def _call_method(self, component: Component, what: str, *arguments: Any) -> Any:
-        """Return what a method of a block returns before the run."""
+        """Call a block's method before the run and return its result; SceneError if it refuses."""
         problems: list[Problem] = []
         answer = None
-        with self._preparing(component.name, problems):
+        with self._naming_failed_block(component.name, problems):
             answer = getattr(component, what)(*arguments)
         _raise_if_problems(problems)
         return answer
 
 
 def _is_equal(one: Any, other: Any) -> bool:
-    """Return whether two words of blocks say the same; not where they cannot be compared."""
+    """Return whether two blocks' offers or requests are equal; False if not comparable."""
     try:
         return bool(one == other)
     except ValueError:  # arrays

@@ -12,14 +12,14 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run, union_of_instants
+from dsa_des.arrays.run_ticks import RunTicks, last_position_at_or_before, union_of_instants
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Input
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.running.effects import WireFaults
 from dsa_des.time.clock import MAX_TICK
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 #: Rows and when they arrive.
 Rows = tuple[RunTicks, Message]
@@ -28,7 +28,7 @@ _MOST_PASSED = 16
 
 
 class Channel:
-    """Rows on their way to one input, in order of run and then of arrival.
+    """The message rows on their way over one wire to an input, ordered by run, then arrival.
 
     Every window takes what arrives in its stretch of time; what each run holds is remembered until
     it has ended.
@@ -57,32 +57,32 @@ class Channel:
         #: First arrival of every message pushed since `watch`.
         self._pushed: list[int] | None = None
 
-    def hold(self, message: Message, tick: int) -> None:
-        """Make `message` the last arrived one in every run, as if it had come at `tick`."""
+    def set_held_message(self, message: Message, tick: int) -> None:
+        """Make `message` the one held by the input in every run, as if it arrived at `tick`."""
         if (count := self._runs.count) == 1:
             self._passed = [(RunTicks.of_run(0, np.array([tick], dtype=np.int64)), message)]
             return
-        held = type(message).concatenate([message] * count).of_runs(np.arange(count))
+        held = type(message).concatenate([message] * count).with_runs(np.arange(count))
         self._passed = [(RunTicks(held.run, np.full(count, tick, dtype=np.int64)), held)]
 
     def state(self) -> tuple[Any, Any]:
-        """Return waiting and held rows, for `set_state`."""
+        """Return the waiting and the held rows, to be restored by `set_state`."""
         return tuple(self._waiting), tuple(self._passed)
 
     def set_state(self, state: tuple[Any, Any]) -> None:
-        """Go back to a state that `state` gave."""
+        """Restore waiting and held rows that `state` returned."""
         self._waiting, self._passed = deque(state[0]), list(state[1])
 
-    def watch(self) -> None:
-        """Take note from now on of when what is pushed arrives."""
+    def record_pushed_arrivals(self) -> None:
+        """Start anew to record the first arrival tick of every message that is pushed."""
         self._pushed = []
 
     def first_pushed_arrival(self) -> int | None:
-        """Return the first arrival of what was pushed since `watch`, or None."""
+        """Return the earliest arrival tick pushed since recording began; None if there are none."""
         return min(self._pushed) if self._pushed else None
 
     def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
-        """Deposit a message and return when its rows arrive, in order.
+        """Add a message and return (run, tick) of arriving rows in order; lost rows left out.
 
         `sent` is the tick at which it was sent, or each of its rows, when that is later than their
         own.
@@ -93,13 +93,13 @@ class Channel:
         if sent is not None:
             arrivals = RunTicks(message.run, np.full(len(message), sent, dtype=np.int64))
         if self.delay_ticks:
-            arrivals = arrivals.later(self.delay_ticks)
+            arrivals = arrivals.add_ticks(self.delay_ticks)
         if self._faults is not None:
             made = message.instants
             kept = np.flatnonzero(self._faults.is_kept(made))
             arrivals, message = arrivals.take(kept), message.take(kept)
-            arrivals = arrivals.later(self._faults.lateness(made.take(kept)))
-            if (order := arrivals.order()) is not None:
+            arrivals = arrivals.add_ticks(self._faults.lateness_ticks(made.take(kept)))
+            if (order := arrivals.sort_indices()) is not None:
                 arrivals, message = arrivals.take(order), message.take(order)
         if self._runs.count > 1 and (self.delay_ticks or self._faults is not None):
             # What would arrive after its run does not: nothing would wait for it there.
@@ -113,8 +113,8 @@ class Channel:
             self._pushed.append(int(arrivals.tick[0]))
         return arrivals
 
-    def forget(self, tick: int) -> None:
-        """Drop rows that a reader of held values can never see at `tick` or later.
+    def drop_superseded_rows(self, tick: int) -> None:
+        """Drop waiting rows that newer ones replace before any reader at `tick` or later.
 
         A slow sensor behind a fast one would otherwise let a message wait for each window between
         two of its scans. Where several runs go, a row is superseded in its own only.
@@ -123,11 +123,11 @@ class Channel:
             while len(self._waiting) > 1 and self._waiting[1][0].tick[0] <= tick:
                 self._waiting.popleft()
 
-    def next_arrivals(self, end: int) -> RunTicks:
-        """Return when rows arrive before `end` that were not collected yet."""
+    def arrivals_before(self, end: int) -> RunTicks:
+        """Return the (run, tick) of the waiting rows that arrive before `end`; none is removed."""
         arriving = []
         for arrivals, _ in self._waiting:
-            due = self._due(arrivals, end)
+            due = self._count_or_mask_before(arrivals, end)
             part = arrivals.take(slice(due) if isinstance(due, int) else due)
             if len(part.tick):
                 arriving.append(part)
@@ -137,12 +137,12 @@ class Channel:
             return RunTicks.concatenate(arriving)
         return union_of_instants(arriving)  # late rows overtake and may coincide
 
-    def quiet_until(self) -> int:
-        """Return a tick before which nothing arrives of what waits."""
+    def earliest_waiting_tick(self) -> int:
+        """Return the earliest arrival tick of the waiting rows; `MAX_TICK` if none wait."""
         return min((int(arrivals.tick.min()) for arrivals, _ in self._waiting), default=MAX_TICK)
 
-    def _due(self, arrivals: RunTicks, end: int) -> int | BoolArray:
-        """Return how many rows arrive before `end`, or which, if they are not the first ones."""
+    def _count_or_mask_before(self, arrivals: RunTicks, end: int) -> int | BoolArray:
+        """Return how many rows arrive before `end` if they are the first, else a mask of them."""
         if len(self._runs.going) == 1:
             return arrivals.count_before_end(end)
         if end >= self._runs.run_ticks:
@@ -151,7 +151,7 @@ class Channel:
         return len(arrivals) if due.all() else due
 
     def collect(self, end: int) -> Rows | None:
-        """Remove and return the rows that arrive before `end`, in order of arrival, or None."""
+        """Remove and return rows that arrive before `end`, in order of arrival; None if none do."""
         if not self._waiting:
             return None
         taken: list[Rows] = []
@@ -161,7 +161,7 @@ class Channel:
             arrivals, message = self._waiting.popleft()
             if not one and arrivals.run[-1] < first:
                 continue  # of a run that has ended before they came
-            due = self._due(arrivals, end)
+            due = self._count_or_mask_before(arrivals, end)
             if not isinstance(due, int):
                 rows, others = np.flatnonzero(due), np.flatnonzero(~due)
                 if len(rows):
@@ -189,17 +189,17 @@ class Channel:
         return collected if len(collected[0]) else None
 
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return what the input holds at each instant (in order, all before `end`).
+        """Return the message rows that the input holds at instants (in order, before `end`).
 
         With the message comes the row of it that is held at each instant, -1 when none has arrived.
         None: it holds nothing at all.
         """
         new = self.collect(end)
         if new is not None:
-            rows = last_position_in_run(new[0], asked)
+            rows = last_position_at_or_before(new[0], asked)
             if rows[0] >= 0 and (len(rows) == 1 or bool((rows >= 0).all())):
                 # What was before need not be looked up.
-                self._pass(new, end)
+                self._keep_as_held(new, end)
                 return new[1], rows
         before = concatenate(self._passed)
         parts = [] if before is None else [_last_of_each_run(*_sort_rows(before))]
@@ -209,11 +209,11 @@ class Channel:
         held = _sort_rows(held)
         self._passed = [held]
         if self._runs.count > 1:
-            self._remember(end)
-        return held[1], last_position_in_run(held[0], asked)
+            self._keep_last_rows(end)
+        return held[1], last_position_at_or_before(held[0], asked)
 
-    def _pass(self, new: Rows, end: int) -> None:
-        """Take note of rows of which every run that asked holds one."""
+    def _keep_as_held(self, new: Rows, end: int) -> None:
+        """Keep collected rows as held, and drop older ones replaced in every run that goes on."""
         if self._runs.count == 1:
             self._passed = [new]
             return
@@ -222,22 +222,24 @@ class Channel:
             self._passed = [part for part in self._passed if part[0].run[-1] >= stop]
         self._passed.append(new)
         if len(self._passed) > _MOST_PASSED or end >= self._runs.run_ticks:
-            self._remember(end)
+            self._keep_last_rows(end)
 
     def _has_all_runs(self, arrivals: RunTicks) -> bool:
-        """Whether there is a row of every run that goes on."""
+        """Return whether the arrivals include every run that goes on."""
         runs = self._runs.going
         if len(runs) == 1:
             return True
         if len(arrivals) < len(runs) and not self._runs.early:
             return False
-        reached = arrivals.run[arrivals.last_of_each]
+        reached = arrivals.run[arrivals.last_position_of_runs]
         if self._runs.early:
-            return self._runs.lasting(reached) == self._runs.lasting(np.array(runs))
+            return self._runs.count_full_length(reached) == self._runs.count_full_length(
+                np.array(runs)
+            )
         return len(reached) == len(runs)
 
-    def _remember(self, end: int) -> None:
-        """Keep the last collected row of each run that goes on."""
+    def _keep_last_rows(self, end: int) -> None:
+        """Reduce the held rows to the last collected one of each run that goes on."""
         runs = self._runs.going
         first = runs.stop if end >= self._runs.run_ticks else runs.start
         going = [part for part in self._passed if part[0].run[-1] >= first]
@@ -253,24 +255,24 @@ def _select_rows(arrivals: RunTicks, message: Message, kept: BoolArray) -> Rows:
 
 
 def _last_of_each_run(arrivals: RunTicks, message: Message) -> Rows:
-    """Return the last row of each run."""
+    """Return the last row of each run, with its arrival."""
     if len(arrivals) == 1:
         return arrivals, message
     if arrivals.is_one_run:
         last = slice(len(arrivals) - 1, None)
         return arrivals.take(last), message.take(last)
-    lasts = arrivals.last_of_each
+    lasts = arrivals.last_position_of_runs
     return arrivals.take(lasts), message.take(lasts)
 
 
 def _sort_rows(rows: Rows) -> Rows:
-    """Put rows in order; what arrives at one instant stays in the order given."""
-    order = rows[0].order()
+    """Return rows sorted by run and arrival; rows arriving at the same instant keep their order."""
+    order = rows[0].sort_indices()
     return rows if order is None else (rows[0].take(order), rows[1].take(order))
 
 
 def concatenate(parts: Sequence[Rows]) -> Rows | None:
-    """Return the rows of all parts as one, in the order given, or None without any."""
+    """Return arrivals and rows of all parts joined in the order given; None if there are none."""
     if not parts:
         return None
     if len(parts) == 1:
@@ -281,19 +283,19 @@ def concatenate(parts: Sequence[Rows]) -> Rows | None:
 
 
 class WireEnd(Protocol):
-    """The receiving end of a wire, as `dsa_des.running.channel.Channel` has it."""
+    """Interface of a wire's receiving end, which `dsa_des.running.channel.Channel` implements."""
 
     source: str
 
     def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return what is held at each instant, all before `end`."""
+        """Return the message rows that the input holds at each instant, all before `end`."""
 
     def collect(self, end: int) -> Rows | None:
-        """Remove and return the rows that arrive before `end`."""
+        """Remove and return the rows that arrive before `end`; None if there are none."""
 
 
 class Inputs:
-    """The wires into a block, by how it reads them."""
+    """The wires into a block, by whether the input holds the latest message or queues them all."""
 
     def __init__(
         self,
@@ -308,7 +310,7 @@ class Inputs:
         self._ticks_per_s = ticks_per_s
         self._runs = Runs() if runs is None else runs
 
-    def wake_at(
+    def make_wake(
         self,
         asked: RunTicks,
         scans: IntArray,
@@ -319,7 +321,7 @@ class Inputs:
         idle: BoolArray | None = None,
         complete: bool = True,
     ) -> Wake | None:
-        """Return what the block sees at some instants, or None if it cannot run at any.
+        """Return the `Wake` of what the block sees at the instants; None if it can run at none.
 
         `scans`, `clock`, `idle` are as for `Wake`; `end` is the first tick that is no longer seen;
         `demand`, given the instants of the wake, returns what `Wake.demand` is. Where `complete`,

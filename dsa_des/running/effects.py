@@ -23,7 +23,7 @@ from dsa_des.time.randomness import Stream
 
 @dataclass(frozen=True, eq=False)
 class Planned:
-    """What became of one effect of one block.
+    """One effect of one block, whether it is simulated in the run, and why.
 
     It exists in the run if `built`; `because` is the reason, also that of a tolerance or of
     ``simulate_everything``.
@@ -47,14 +47,14 @@ WrapEffect = Callable[[Planned, Any], Any]
 def plan_effects(
     block: Component, tolerance: Mapping[str, float], *, everything: bool = False
 ) -> list[Planned]:
-    """Decide which of a block's effects are built.
+    """Return which of a block's effects are to be built (simulated), and why; builds nothing.
 
     `tolerance` is ``[accuracy]`` of the scene: by quantity, how large an error is allowed. Effects
     are left out, smallest first, as long as the sum of their bounds stays within it. With
     `everything`, all are built that can be parametrised neutrally.
     """
     verdicts = [(effect, effect.verdict(block)) for effect in type(block).effects]
-    allowed = {} if everything else _effects_within_tolerance(verdicts, tolerance)
+    allowed = {} if everything else _omitted_within_tolerance(verdicts, tolerance)
     planned = []
     for effect, verdict in verdicts:
         built, because = verdict.simulated, verdict.because
@@ -73,7 +73,7 @@ def build_effects(
     everything: bool = False,
     wrap: WrapEffect | None = None,
 ) -> list[Planned]:
-    """Decide which of a block's effects are built, as `plan`, and give them to its context."""
+    """Decide a block's simulated effects, build those into its context; return all decisions."""
     planned = plan_effects(block, tolerance, everything=everything)
     built = {item: _build_effect(block, item.effect) for item in planned if item.built}
     if not everything:
@@ -89,11 +89,12 @@ def _build_effect(block: Component, effect: Effect[Any]) -> Any:
     """Return what an effect builds; ValueError where the block could not use it."""
     value = effect.build(block)
     for hook in block.all_hooks():
-        if hook == effect.acts_on and hook.is_called != callable(value):
-            what = "something to call" if hook.is_called else "a value"
+        if hook == effect.acts_on and hook.builds_callable != callable(value):
+            what = "something to call" if hook.builds_callable else "a value"
             raise ValueError(
-                f"effect {effect.name!r} of {type(block).path()} builds {shown_value(value)}: "
-                f"{hook} needs {what}, {hook.sentence()}"
+                f"effect {effect.name!r} of {type(block).import_path()} builds "
+                f"{shown_value(value)}: "
+                f"{hook} needs {what}, {hook.signature_text()}"
             )
     return value
 
@@ -110,10 +111,10 @@ def remaining_tolerance(
     return left
 
 
-def _effects_within_tolerance(
+def _omitted_within_tolerance(
     verdicts: Sequence[tuple[Effect, Verdict]], tolerance: Mapping[str, float]
 ) -> dict[str, str]:
-    """Return the effects whose bounds together stay within the tolerance, and why each."""
+    """Return left-out effect name → reason: their bounds together stay within the tolerance."""
     left = dict(tolerance)
     allowed: dict[str, str] = {}
     bounded = [
@@ -136,7 +137,7 @@ def _effects_within_tolerance(
 
 @dataclass(frozen=True)
 class _OfKey(Effect):
-    """An effect that exists where a key of a wire, a block or a clock is given and not 0.
+    """An effect that is simulated where a key of a wire, a block or a clock is given and not 0.
 
     `everywhere` stands for all places that have none of it: "every wire".
     """
@@ -148,7 +149,7 @@ class _OfKey(Effect):
     neutral: bool = True  # type: ignore[misc]
 
     def verdict(self, block: Any) -> Verdict:
-        """Ask a wire, a block's options or a clock for the key."""
+        """Return whether a wire's, block's or clock's key is given and not 0, and a text on it."""
         value = getattr(block, self.key)
         if self.key == "delay_s" and block.delay_scans:
             return Verdict(True, f"delay is {block.delay_scans} scans")
@@ -176,7 +177,7 @@ OF_CLOCKS = (
 
 
 def plan_timing_effects(scene: Scene, *, everything: bool = False) -> list[Planned]:
-    """Return the verdict on each timing effect, one entry for each block or wire that it acts on.
+    """Return which timing effects are simulated and why, per block or wire that each acts on.
 
     Where a scene calls for an effect nowhere, or only in some places, one entry speaks for all
     the others.
@@ -213,13 +214,13 @@ def _plan_key(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -
 
 
 def may_lose_or_delay(wire: Wire, everything: bool) -> bool:
-    """Return whether loss and jitter are drawn for the messages of a wire."""
+    """Return whether loss or jitter is simulated for the messages of a wire."""
     return everything or LOSS.verdict(wire).simulated or WIRE_JITTER.verdict(wire).simulated
 
 
 @dataclass(frozen=True)
 class WireFaults:
-    """Keyed faults of one wire; a row's fate depends on the wire, its run and its instant only.
+    """Random loss and delay of a wire's rows, fixed by the wire, the row's run and its instant.
 
     Each row is late by `late_ticks` and a uniformly drawn part of `jitter_ticks`; draws are named
     after the wire. From each of `from_ticks` on, rows that are made have the next value of each.
@@ -234,21 +235,23 @@ class WireFaults:
     ticks_per_s: int
 
     def is_kept(self, made: RunTicks) -> BoolArray:
-        """Return which rows made at some instants are not lost."""
-        return self._draw_delays(self.drops, made) >= self.drop_probability[self._stretch(made)]
+        """Return a mask of rows made at these instants, True for those that are not lost."""
+        return (
+            self._draw_uniform(self.drops, made) >= self.drop_probability[self._stretch_index(made)]
+        )
 
-    def lateness(self, made: RunTicks) -> IntArray:
-        """Return the extra delay of rows made at some instants, in ticks."""
-        of = self._stretch(made)
-        drawn = np.rint(self._draw_delays(self.jitter, made) * self.jitter_ticks[of]).astype(
+    def lateness_ticks(self, made: RunTicks) -> IntArray:
+        """Return the extra delay of each row made at these instants, in ticks."""
+        of = self._stretch_index(made)
+        drawn = np.rint(self._draw_uniform(self.jitter, made) * self.jitter_ticks[of]).astype(
             np.int64
         )
         return self.late_ticks[of] + drawn
 
-    def _stretch(self, made: RunTicks) -> IntArray:
+    def _stretch_index(self, made: RunTicks) -> IntArray:
         of: IntArray = np.searchsorted(self.from_ticks, made.tick, side="right") - 1
         return of
 
-    def _draw_delays(self, stream: Stream, sent: RunTicks) -> FloatArray:
+    def _draw_uniform(self, stream: Stream, sent: RunTicks) -> FloatArray:
         instant = nanosecond_of(sent.tick, self.ticks_per_s)
         return stream.of_runs(sent.run, instant).uniform(instant.astype(np.uint64), 0)

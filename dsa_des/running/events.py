@@ -9,12 +9,12 @@ from typing import Any, Protocol
 import numpy as np
 import simpy
 
-from dsa_des.arrays.run_ticks import RunTicks, runs_of_single
+from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
 from dsa_des.running.windows import RunningBlock, Window
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 # SimPy's own URGENT (0) ends a run just before an instant; nothing of ours may come before it.
 WINDOW_PRIORITY = 1.0
@@ -24,7 +24,7 @@ LEAVE_PRIORITY = 0.5
 
 
 class Abort(Exception):
-    """Leaves SimPy after a block failed; the failure itself is kept by the simulation.
+    """Raised to leave SimPy after a block failed; the simulation keeps the failure itself.
 
     SimPy rebuilds an exception from its ``args``, which breaks those that need keywords, so the
     original never travels through it.
@@ -32,7 +32,7 @@ class Abort(Exception):
 
 
 class WakeUp(simpy.Event):
-    """An event that happens after `delay` ticks with a priority of its own."""
+    """A SimPy event that happens `delay` ticks from now, with a priority of its own."""
 
     def __init__(self, env: simpy.Environment, delay: int, priority: Any) -> None:
         super().__init__(env)
@@ -42,10 +42,10 @@ class WakeUp(simpy.Event):
 
 
 class Bell(simpy.Event):
-    """What a block's process waits for; rung from inside a `WakeUp`, so it keeps its priority."""
+    """A SimPy event that a block's process waits for; rung in a `WakeUp`, it keeps its priority."""
 
     def ring(self) -> None:
-        """Resume the waiting processes, now, within the current event."""
+        """Resume the waiting processes immediately, within the current event."""
         callbacks, self.callbacks = self.callbacks, None  # type: ignore[assignment]
         self._ok = True
         self._value = None
@@ -54,7 +54,7 @@ class Bell(simpy.Event):
 
 
 class RunState(Protocol):
-    """The state of a run that all of its blocks share.
+    """Interface of the state of a run that all of its blocks share.
 
     ``window`` is the one that runs now; ``recorder`` is None where nothing is recorded.
     """
@@ -68,30 +68,31 @@ class RunState(Protocol):
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
     ) -> None:
-        """Note that a block raised when it handled `ticks`, and leave SimPy."""
+        """Record that a block raised an error when it handled `ticks`, and leave SimPy."""
 
 
 class OwnProcess(Protocol):
-    """The runtime of a block that has a process of its own."""
+    """Interface through which a block with a SimPy process of its own is run."""
 
     simulation: RunState
 
     def priority(self) -> float:
-        """Return its place within an instant."""
+        """Return the block's priority among the events of one instant."""
 
     def wait(self) -> Bell | WakeUp:
         """Return the event of the next arrival at a trigger input."""
 
     def receive(self) -> Wake:
-        """Return the inputs as they are now."""
+        """Return a `Wake` with the inputs as they are now."""
 
     @property
     def send(self) -> Callable[..., None]:
-        """Send a message, or messages by output name, of some instants."""
+        """Send a message, or messages by output name, for the given instants."""
 
 
 class BlockEnvironment:
-    """SimPy's environment as one block sees it: same words, times in ticks, events in its order.
+    """SimPy's environment for one block: the same method names, times in ticks, and events in the
+    block's place within an instant.
 
     A timeout here resumes the block at its own place within the instant, after every block
     upstream; SimPy's own timeouts would resume it before them.
@@ -107,7 +108,7 @@ class BlockEnvironment:
 
     @property
     def ticks_per_s(self) -> int:
-        """Resolution of the run."""
+        """Ticks per second of the run."""
         return self._node.simulation.ticks_per_s
 
     @property
@@ -130,7 +131,7 @@ class BlockEnvironment:
         return self._node.wait()
 
     def receive(self) -> Wake:
-        """Return the inputs as they are now; queued rows are handed out once."""
+        """Return a `Wake` with the inputs as they are now; queued rows are handed out once."""
         return self._node.receive()
 
     def send(self, result: Any, leaves: int | None = None) -> None:
@@ -138,7 +139,7 @@ class BlockEnvironment:
 
         It sets out later, where `leaves` is a later tick: before any block runs then.
         """
-        self._node.send(result, RunTicks(runs_of_single(1), self.tick_array()), leaves)
+        self._node.send(result, RunTicks(single_run_numbers(1), self.tick_array()), leaves)
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

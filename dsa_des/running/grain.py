@@ -11,21 +11,21 @@ from dsa_des.errors import SceneError
 from dsa_des.errors.budgets import MOST_SCANS
 from dsa_des.running.loops import (
     Edge,
-    blocks_before_loops,
-    cut_loops,
-    edges_opening_loops,
+    blocks_not_behind_loops,
+    longest_delay_cut_edges,
+    loop_cut_edges,
     shortest_delay_s,
 )
 from dsa_des.running.node import Node
-from dsa_des.scene.graph import add_queue_nodes, cycle_numbers, queue_key, window_order
+from dsa_des.scene.graph import add_queue_nodes, loop_number_by_block, queue_node_name, window_order
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 def _blocks_without_windows(scene: Scene) -> dict[str, str]:
-    """Return the blocks of a scene that no window of a loop can hold, and why each."""
+    """Return block → why it cannot run in windows: own process, scan by scan, shared processor."""
     reasons = {}
     for name, block in sorted(scene.blocks.items()):
         if block.cls.process is not None:
@@ -38,7 +38,7 @@ def _blocks_without_windows(scene: Scene) -> dict[str, str]:
 
 
 def _explain_fast_feedback(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
-    """Return the blocks that send over the wires that are shorter than scans are apart."""
+    """Return block → reason, for blocks that feed back over loops sooner than the next scan."""
     stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
     per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
@@ -57,7 +57,7 @@ def windowed_blocks(scene: Scene, queues: Collection[str]) -> set[str]:
     itself windowed, have no process of its own, queue for no shared processor but those in
     `queues`, be in no feedback loop, and be fed by windowed blocks only.
     """
-    looped = cycle_numbers(scene.graph)
+    looped = loop_number_by_block(scene.graph)
     windowed: set[str] = set()
     for name in nx.topological_sort(scene.graph.subgraph(set(scene.graph) - looped.keys())):
         processor = scene.blocks[name].options.processor
@@ -69,7 +69,7 @@ def windowed_blocks(scene: Scene, queues: Collection[str]) -> set[str]:
 
 
 def windowed_queues(scene: Scene) -> set[str]:
-    """Return the shared processors that serve a look-ahead window at once.
+    """Return the shared processors that can serve all messages of a look-ahead window in one go.
 
     Their blocks must run in look-ahead windows, and none of them may wait for what comes out of
     the queue, through whichever blocks or other queues.
@@ -79,9 +79,13 @@ def windowed_queues(scene: Scene) -> set[str]:
     policies = {name: find_policy(p.when_busy) for name, p in scene.processors.items()}
     able = {name for name, policy in policies.items() if policy.skips is QueuePolicy.skips}
     while able:
-        looped = cycle_numbers(add_queue_nodes(scene.graph, {name: queues[name] for name in able}))
+        looped = loop_number_by_block(
+            add_queue_nodes(scene.graph, {name: queues[name] for name in able})
+        )
         windowed = windowed_blocks(scene, able)
-        left = {n for n in able if queue_key(n) not in looped and windowed.issuperset(queues[n])}
+        left = {
+            n for n in able if queue_node_name(n) not in looped and windowed.issuperset(queues[n])
+        }
         if left == able:
             break
         able = left
@@ -90,7 +94,7 @@ def windowed_queues(scene: Scene) -> set[str]:
 
 @dataclass(frozen=True)
 class Grain:
-    """How the blocks of a run take windows.
+    """Which of a run's blocks handle whole windows or run scan by scan, and where loops are cut.
 
     Parameters
     ----------
@@ -118,12 +122,12 @@ class Grain:
     ahead: set[str] = field(default_factory=set)
 
     def order(self, scene: Scene, first: Collection[str] = ()) -> dict[str, int]:
-        """Return the place of each block and each queue in a window (`window_order`)."""
+        """Return block or queue → its place in order of handling a window (`window_order`)."""
         return window_order(scene.graph, self.windowed, self.cut_edges, self.queues, first)
 
 
 def choose_grain(scene: Scene, window: int | None) -> Grain:
-    """Return at which grain the blocks of a scene run; `window` is that of `Simulation`.
+    """Return which blocks run in windows or scan by scan; `window` is as for `Simulation`.
 
     Loops run in windows: as long as an open loop's, which are undone if something came back, where
     all blocks let themselves be rewound; else no longer than what is sent takes to come back.
@@ -131,17 +135,17 @@ def choose_grain(scene: Scene, window: int | None) -> Grain:
     if window == 1:
         return Grain(set(), False, set(), {})
     slow: dict[str, str] = {}
-    if cycle_numbers(scene.graph):
+    if loop_number_by_block(scene.graph):
         slow, opened, every = (
             _blocks_without_windows(scene),
-            edges_opening_loops(scene),
+            longest_delay_cut_edges(scene),
             set(scene.blocks),
         )
         # Who looks ahead of a run's end must not fail there.
         ending = any(may_end_its_run(cls) for cls in scene.classes.values())
-        ahead = blocks_before_loops(scene.graph)
+        ahead = blocks_not_behind_loops(scene.graph)
         if not slow and all(cls.rewindable for cls in scene.classes.values()):
-            return Grain(every, True, cut_loops(scene.graph, scene.classes), {}, ahead=ahead)
+            return Grain(every, True, loop_cut_edges(scene.graph, scene.classes), {}, ahead=ahead)
         slow = slow or _explain_fast_feedback(scene, opened)
         if not slow:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
@@ -153,13 +157,13 @@ def choose_grain(scene: Scene, window: int | None) -> Grain:
 
 
 def blocks_held_back(scene: Scene, windowed: Collection[str]) -> list[str]:
-    """Return the blocks that could look ahead, but for others."""
+    """Return, sorted, the blocks that could run in windows but do not because of other blocks."""
     classes = scene.classes
     return sorted(n for n in scene.blocks if _can_take_windows(classes[n]) and n not in windowed)
 
 
 def _blocks_that_prevent_windows(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
-    """Return the blocks behind which others run scan by scan, and why each does."""
+    """Return block → reason, for blocks without windows, which make later ones go scan by scan."""
     kept = set(blocks_held_back(scene, windowed))
     return {
         name: why
@@ -179,7 +183,7 @@ CELLS_PER_WINDOW = 131072
 
 
 def scans_per_run(nodes: Mapping[str, Node], runs: Runs) -> float:
-    """Return how many scans of all clocks together each run has, about."""
+    """Return about how many scans each run has, summed over all clocks."""
     return float(sum(runs.run_ticks / clock.period for clock in _clocks(nodes.values())))
 
 
@@ -193,8 +197,8 @@ def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
         raise SceneError([scene.problem("duration_s", message)])
 
 
-def longest_window(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
-    """Return the ticks of a window that holds about the wanted number of scans.
+def longest_window_ticks(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
+    """Return the length of a window, in ticks, that holds about the wanted number of scans.
 
     `window` are scans of all clocks together; by default, and where blocks run scan by scan anyway,
     as many as make a window of `CELLS_PER_WINDOW`.

@@ -7,7 +7,7 @@ from typing import Any
 import networkx as nx
 
 from dsa_des.block.component import Component
-from dsa_des.scene.graph import cycle_numbers, window_order
+from dsa_des.scene.graph import loop_number_by_block, window_order
 from dsa_des.scene.scene import Scene
 
 #: From which block to which.
@@ -15,11 +15,11 @@ Edge = tuple[str, str]
 
 
 def _edges_closing_loops(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[Edge]:
-    """Return delayed edges without which a graph has no loop: of each loop one of the highest rank.
+    """Return delayed edges whose removal leaves no loops, from each loop one of highest `rank`.
 
     An edge is taken out only if it closes a loop of edges of its rank or lower ones.
     """
-    looped = cycle_numbers(graph)
+    looped = loop_number_by_block(graph)
     kept = nx.DiGraph()
     kept.add_nodes_from(looped)
     delayed = []
@@ -38,17 +38,17 @@ def _edges_closing_loops(graph: nx.DiGraph, rank: Callable[[Edge], Any]) -> set[
     return closing
 
 
-def cut_loops(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[Edge]:
-    """Return delayed edges whose removal leaves no loop, few of them.
+def loop_cut_edges(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> set[Edge]:
+    """Return a small set of delayed edges whose removal leaves the graph without loops.
 
     Edges into inputs that a block can do without are the first to go: that is where a loop closes.
     """
     return _edges_closing_loops(graph, lambda edge: _is_optional_edge(graph, classes, edge))
 
 
-def blocks_before_loops(graph: nx.DiGraph) -> set[str]:
-    """Return the blocks that no loop leads to; none where there is no loop."""
-    looped = cycle_numbers(graph)
+def blocks_not_behind_loops(graph: nx.DiGraph) -> set[str]:
+    """Return the blocks neither in a loop nor downstream of one; none if the graph has no loop."""
+    looped = loop_number_by_block(graph)
     behind = set(looped).union(*(nx.descendants(graph, name) for name in looped))
     return set(graph) - behind if looped else set()
 
@@ -56,13 +56,13 @@ def blocks_before_loops(graph: nx.DiGraph) -> set[str]:
 def _is_optional_edge(
     graph: nx.DiGraph, classes: Mapping[str, type[Component]], edge: Edge
 ) -> bool:
-    """Whether the receiving block can do without what comes over an edge."""
+    """Return whether the receiving block can run without what arrives over an edge."""
     inputs = classes[edge[1]].inputs
     return all(not inputs[wire.input].required for wire in graph.edges[edge]["wires"])
 
 
-def edges_opening_loops(scene: Scene) -> set[Edge]:
-    """Return delayed edges without which the scene has no loop, those of the longest delays.
+def longest_delay_cut_edges(scene: Scene) -> set[Edge]:
+    """Return delayed edges whose removal leaves no loops in the scene, with the longest delays.
 
     The shortest of those taken out is as long as can be.
     """
@@ -72,11 +72,13 @@ def edges_opening_loops(scene: Scene) -> set[Edge]:
 def shortest_delay_s(scene: Scene, edge: Edge) -> Fraction:
     """Return the shortest delay of the wires from one block to another, s."""
     wires = [wire for wire in scene.wires if (wire.source, wire.target) == edge]
-    return min(wire.total_delay_s + wire.delay_scans * _period_s(scene, edge) for wire in wires)
+    return min(
+        wire.total_delay_s + wire.delay_scans * _scan_period_s(scene, edge) for wire in wires
+    )
 
 
-def _period_s(scene: Scene, edge: Edge) -> Fraction:
-    """Return the time between scans that delays on an edge count in; 0 where there are none."""
+def _scan_period_s(scene: Scene, edge: Edge) -> Fraction:
+    """Return the scan period, s, counting an edge's delays: receiver's, else sender's, else 0."""
     for name in reversed(edge):
         block = scene.blocks[name]
         spec = block.cls.clock_of(block.parameters)
@@ -86,7 +88,7 @@ def _period_s(scene: Scene, edge: Edge) -> Fraction:
 
 
 def offer_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> dict[str, int]:
-    """Return the place of each block in the order in which blocks tell each other what they offer.
+    """Return block → its place in the order in which blocks pass on what they offer.
 
     Requests go the other way. Both pass over wires with and without delay; loops are opened at
     their sources, which tell without having heard anything, else where an input can be done
@@ -98,8 +100,8 @@ def offer_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> di
 
     opened = nx.DiGraph(graph)
     for opens in (of_source, lambda edge: _is_optional_edge(graph, classes, edge)):
-        if not (looped := cycle_numbers(opened)):
+        if not (looped := loop_number_by_block(opened)):
             break
         inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]
         opened.remove_edges_from([edge for edge in inside if opens(edge)])
-    return window_order(opened, set(graph), cut_loops(opened, classes))
+    return window_order(opened, set(graph), loop_cut_edges(opened, classes))

@@ -14,9 +14,9 @@ import simpy
 
 from dsa_des.arrays.run_ticks import (
     RunTicks,
-    last_position_in_run,
-    positions_among,
-    runs_of_single,
+    last_position_at_or_before,
+    positions_with_found_mask,
+    single_run_numbers,
     union_of_instants,
 )
 from dsa_des.arrays.types import BoolArray, IntArray
@@ -44,7 +44,7 @@ from dsa_des.time.run_clock import RunClock
 
 @dataclass
 class Node:
-    """The runtime of one block.
+    """Runs one block: wakes it, gives it its inputs, and delivers what it sends.
 
     Invariants: `run_at` is called with increasing ticks; at each of them every undelayed sender
     has run; only here are a channel's rows collected.
@@ -88,13 +88,13 @@ class Node:
         return [wire for port in self._trigger_ports for wire in self.channels.get(port, ())]
 
     @property
-    def last(self) -> Component:
-        """The block as it is now, with what it remembers."""
-        return self.component if self.stretched is None else self.stretched.now
+    def current_component(self) -> Component:
+        """The instance of the block that is in force now, with its state."""
+        return self.component if self.stretched is None else self.stretched.current_instance
 
     @property
     def state_objects(self) -> list[object]:
-        """All objects whose attributes hold its state."""
+        """All objects whose attributes hold the block's state."""
         failing = [] if self.outages is None else [self.outages]
         if self.stretched is not None:
             return [*failing, *self.stretched.state_objects]
@@ -138,7 +138,7 @@ class Node:
             self.simulation.fail(self, ticks, error)
 
     def failure_counts(self) -> Mapping[str, IntArray]:
-        """Return in which runs it never ran, as counts (2, runs), where there are any."""
+        """Return failure → counts (2, runs): runs in which it never ran, outages; empty if none."""
         out = {} if self.outages is None else self.outages.failure_counts()
         if self.component.process is not None or self._all_ran:
             return out
@@ -148,8 +148,8 @@ class Node:
         never = np.array([idle, np.ones(len(idle))], dtype=np.int64)
         return {f"it never ran{why}": never, **out}
 
-    def wake_at(self, tick: int) -> None:
-        """Let the block run at `tick` (once, however often it is asked)."""
+    def schedule_at(self, tick: int) -> None:
+        """Schedule the block to run at `tick`; further calls for the same tick change nothing."""
         if tick in self._scheduled:
             return
         self._scheduled.add(tick)
@@ -179,28 +179,28 @@ class Node:
     # -- when ----------------------------------------------------------------------------------
 
     def open_window(self, window: Window) -> None:
-        """Schedule everything this block's clock asks for in a window."""
+        """Schedule all that the block's clock calls for in a window."""
         start, end = window.start, window.end
         if self.processor is not None:
             self.processor.open_window(start, end)
         if self.windowed:
             if self._window_end(window) > start:
-                self.wake_at(start)
+                self.schedule_at(start)
             return
         if self.clock is not None:
             scans, instants = self.clock.between(start, end)
             self._scan_at = dict(zip(instants.tick.tolist(), scans.tolist(), strict=True))
             for tick in self._scan_at:
-                self.wake_at(tick)
+                self.schedule_at(tick)
         elif self.on_demand:
             for tick in self._demanded_instants(start, end).tick.tolist():
-                self.wake_at(tick)
+                self.schedule_at(tick)
         if self.pulse is not None:
             for tick in self.pulse.between(start, end)[1].tick.tolist():
-                self.wake_at(tick)
+                self.schedule_at(tick)
 
-    def quiet_until(self, start: int, ahead: int) -> int:
-        """Return a tick, at `start` or later, before which a block in windows does not run.
+    def next_run_bound(self, start: int, ahead: int) -> int:
+        """Return a tick, `start` or later, before which a block run in windows does not run.
 
         It has come up to `ahead` if it runs ahead.
         """
@@ -211,11 +211,11 @@ class Node:
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
         ticks = [clock.next_scan_bound(start + lead) - lead for clock, lead in clocks]
-        ticks += [wire.quiet_until() for wire in self._trigger_wires]
+        ticks += [wire.earliest_waiting_tick() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
     def _window_end(self, window: Window) -> int:
-        """Return up to when it runs in a window."""
+        """Return the tick that ends the block's window; later for blocks ahead of all loops."""
         return window.ahead if self.ahead else window.end
 
     def _demanded_instants(self, start: int, end: int) -> RunTicks:
@@ -225,16 +225,16 @@ class Node:
 
     def _run_at(self, tick: int) -> None:
         runs = self.simulation.runs
-        if runs.early and runs.is_over(tick):
+        if runs.early and runs.have_all_ended(tick):
             return
         scan = self._scan_at.get(tick, -1)
         idle = None
         if self.pulse is not None and scan < 0:
             # What came while the block was out does not come now.
-            new = [wire.next_arrivals(tick + 1).tick for wire in self._trigger_wires]
+            new = [wire.arrivals_before(tick + 1).tick for wire in self._trigger_wires]
             idle = np.array([not any((arrival == tick).any() for arrival in new)])
         waiting = idle is not None and bool(idle[0])
-        if not waiting and self.processor is not None and self.processor.refuses(self.name):
+        if not waiting and self.processor is not None and self.processor.skip_if_busy(self.name):
             for wire in self._trigger_wires:
                 wire.collect(tick + 1)  # what came to be worked on now is left out with it
             return
@@ -246,21 +246,21 @@ class Node:
         else:
             instants = self._demanded_instants(start, end) if self.on_demand else RunTicks.empty()
             scans = _no_scan_numbers(len(instants))
-        arrivals = [wire.next_arrivals(end) for wire in self._trigger_wires]
+        arrivals = [wire.arrivals_before(end) for wire in self._trigger_wires]
         if any(len(part.tick) for part in arrivals):
             own, numbers = instants, scans
             instants = _concatenate([own, *arrivals])
             scans = _no_scan_numbers(len(instants))
             if len(own) and self.clock is not None:
                 scans = scans.copy()
-                scans[last_position_in_run(instants, own)] = numbers
+                scans[last_position_at_or_before(instants, own)] = numbers
         idle = None
         if self.pulse is not None and len(pulses := self.pulse.between(start, end)[1]):
             busy = instants
             instants = _concatenate([busy, pulses])
             idle = np.ones(len(instants), dtype=bool)
             if len(busy):
-                rows = last_position_in_run(instants, busy)
+                rows = last_position_at_or_before(instants, busy)
                 scans, numbers = np.full(len(instants), -1), scans
                 scans[rows], idle[rows] = numbers, False
             else:
@@ -287,24 +287,24 @@ class Node:
             idle = None if idle is None else idle[up]
             if not len(instants):
                 return
-        wake = self._inputs.wake_at(
-            instants, scans, end, self._demanded_rows, clock=before, idle=idle
+        wake = self._inputs.make_wake(
+            instants, scans, end, self._rows_demanded_by_block, clock=before, idle=idle
         )
         if wake is None:
             return
         if self.outages is not None:
-            wake = self.outages.drop_unheard(wake)
+            wake = self.outages.drop_arrivals_during_outage(wake)
         ticks = wake.ticks
         if not self._all_ran:
             if not len(self._ran):
                 self._ran = np.zeros(self.simulation.runs.count, dtype=bool)
-            self._ran[wake.run[wake.instants.first_of_each]] = True
+            self._ran[wake.run[wake.instants.first_position_of_runs]] = True
             self._all_ran = bool(self._ran.all())
         try:
             if self.stretched is None:
                 self.send(self.runner.run(wake), wake.instants)
             else:
-                for runner, part in self.stretched.parts(wake):
+                for runner, part in self.stretched.split_by_stretch(wake):
                     self.send(runner.run(part), part.instants)
         except (Abort, RunRefused):
             raise
@@ -313,7 +313,7 @@ class Node:
                 raise
             self.simulation.fail(self, ticks, error, int(wake.scans[0]))
 
-    def _demanded_rows(self, instants: RunTicks) -> Mapping[str, IntArray]:
+    def _rows_demanded_by_block(self, instants: RunTicks) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
             return {}
         start, end = int(instants.tick[0]), int(instants.tick[-1]) + 1
@@ -323,7 +323,7 @@ class Node:
         rows = {}
         for demand in self.demands:
             asked = demand.instants_between(start, end)
-            rows_asked, there = positions_among(instants, asked)
+            rows_asked, there = positions_with_found_mask(instants, asked)
             rows[demand.block] = rows_asked if there is None else rows_asked[there]
         return rows
 
@@ -332,20 +332,20 @@ class Node:
         self._missed = False
         tick = int(self.simulation.env.now)
         scans = np.array([-1], dtype=np.int64)
-        wake = self._inputs.wake_at(_single_instant(tick), scans, tick + 1, complete=False)
+        wake = self._inputs.make_wake(_single_instant(tick), scans, tick + 1, complete=False)
         assert wake is not None
         return wake
 
     # -- sending -------------------------------------------------------------------------------
 
     def send(self, result: Any, ran: RunTicks, leaves: int | None = None) -> None:
-        """Send what a block returned when it ran: a message, or messages by output.
+        """Send what a block returned when it ran: a message, or messages by output name.
 
         `ran` are the instants that it ran at; it sets out at `leaves`, where that is later.
         """
         for port, message in checked_messages(result, self.component.outputs, ran):
             if self.outages is not None:
-                message = self.outages.sent(port, message)
+                message = self.outages.corrupt_output(port, message)
             if isinstance(message, RunEnd):
                 self.simulation.runs.note_ends(message.instants, self.name)
             if self.simulation.recorder is not None:
@@ -368,14 +368,14 @@ class Node:
         for channel, node, target_port in self.subscribers.get(port, []):
             arrivals = channel.push(message, sent)
             if node.component.inputs[target_port].mode == "sampled":
-                channel.forget(self.simulation.window.start)
+                channel.drop_superseded_rows(self.simulation.window.start)
             if not node.windowed and target_port in node._trigger_ports:
                 for arrival in arrivals.tick.tolist():
-                    node.wake_at(arrival)
+                    node.schedule_at(arrival)
 
 
 def _concatenate(parts: Sequence[RunTicks]) -> RunTicks:
-    """Return the instants of all parts."""
+    """Return the union of the (run, tick) instants of all parts, in order."""
     filled = [part for part in parts if len(part.tick)]
     if len(filled) > 1:
         return union_of_instants(filled)
@@ -391,4 +391,4 @@ def _no_scan_numbers(rows: int) -> IntArray:
 
 
 def _single_instant(tick: int) -> RunTicks:
-    return RunTicks(runs_of_single(1), np.array([tick], dtype=np.int64))
+    return RunTicks(single_run_numbers(1), np.array([tick], dtype=np.int64))

@@ -15,7 +15,7 @@ from dsa_des.running.node import Node
 from dsa_des.running.processors import Processor, Service
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Demand
-from dsa_des.scene.graph import block_depths, queue_key
+from dsa_des.scene.graph import block_depths, queue_node_name
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.time.clock import MAX_TICK
@@ -30,7 +30,7 @@ def build_nodes(
     processors: Mapping[str, Processor],
     shuffle_ties: int | None,
 ) -> dict[str, Node]:
-    """Return the running blocks, which no wire connects yet."""
+    """Return name → node running the block, for all blocks of a scene; wires not connected yet."""
     scene, components = timeline.scene, stretches[0]
     # Who ends runs comes before all that it does not depend on: that is not run beyond the end.
     ending = [name for name, block in components.items() if may_end_its_run(type(block))]
@@ -45,7 +45,7 @@ def build_nodes(
         node.runner = timeline.runner(component)
         node.stretched = timeline.stretched([of[name] for of in stretches])
         node.clock = timeline.clock(name, component)
-        node.pulse = timeline.pulse(component)
+        node.pulse = timeline.periodic_wake_clock(component)
         node.processor = processors.get(scene.blocks[name].options.processor or "")
         node.ahead = name in grain.ahead
         node.outages = timeline.outages(name)
@@ -60,7 +60,7 @@ def build_processors(
     env: simpy.Environment,
     record: Callable[[str, Message], None],
 ) -> dict[str, Processor]:
-    """Return the shared processors of a scene.
+    """Return name → shared processor, for those of a scene.
 
     A `SceneError` says which parameters make no sense.
     """
@@ -76,7 +76,7 @@ def build_processors(
             service = Service(name, of_stretches, timeline.from_ticks, ticks_per_s, draws)
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
-        at_once = WINDOW_PRIORITY + order[queue_key(name)] if name in grain.queues else None
+        at_once = WINDOW_PRIORITY + order[queue_node_name(name)] if name in grain.queues else None
         processors[name] = Processor(name, p, service, env, ticks_per_s, record, at_once)
     return processors
 
@@ -90,7 +90,7 @@ def _make_priority(
 
 
 def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -> None:
-    """Lay every wire, and tell each block whose scans its rows are for.
+    """Make a channel for every wire, and tell each node which blocks' scans need its rows.
 
     A `SceneError` says which delay makes no sense, or which block that runs on demand has nobody to
     demand anything.
@@ -101,7 +101,7 @@ def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -
         channel = timeline.channel(wires, _scan_delay(scene, wire, nodes))
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
-            channel.hold(declared.make_initial(wire.holds), 0)
+            channel.set_held_message(declared.make_initial(wire.holds), 0)
         target = nodes[wire.target]
         carrying = target.component.context.platform
         if carrying in nodes[wire.source].component.platforms():
@@ -111,7 +111,9 @@ def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -
             (channel, target, wire.input)
         )
     for wires in zip(*of_stretches, strict=True):
-        if len({wire.total_delay_s for wire in wires}) > 1 and _is_foreseen(nodes, wires[0]):
+        if len({wire.total_delay_s for wire in wires}) > 1 and _carries_demanded_rows(
+            nodes, wires[0]
+        ):
             message = (
                 f"{wires[0]}: its delay cannot change while a run lasts: {wires[0].source} runs on "
                 "demand, ahead of scans by so much"
@@ -125,7 +127,7 @@ def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -
 
 
 def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
-    """Return the first clocked blocks on every way downstream, and the delay on the way.
+    """Return the nearest blocks with scan clocks on each path downstream, and the delay to each.
 
     What comes back to it around a loop asks nothing new of it: each turn would, one delay earlier.
     """
@@ -146,8 +148,8 @@ def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
     return [demands[key] for key in sorted(demands)]
 
 
-def _is_foreseen(nodes: Mapping[str, Node], wire: Wire) -> bool:
-    """Return whether what comes over a wire is asked of a block that runs on demand."""
+def _carries_demanded_rows(nodes: Mapping[str, Node], wire: Wire) -> bool:
+    """Return whether rows that a scan downstream demands of an on-demand block come over a wire."""
     target, todo, seen = nodes[wire.target], [wire.source], {wire.source}
     if target.clock is None and not find_demands(nodes, wire.target):
         return False
@@ -161,8 +163,8 @@ def _is_foreseen(nodes: Mapping[str, Node], wire: Wire) -> bool:
     return False
 
 
-def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
-    """Return how long what is sent takes at least over some edges, or None without any."""
+def shortest_delay_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | None:
+    """Return the shortest delay of the wires over some edges, in ticks; None if there are none."""
     delays = (
         channel.delay_ticks
         for name, node in nodes.items()
@@ -172,8 +174,8 @@ def horizon_ticks(nodes: Mapping[str, Node], opened: Collection[Edge]) -> int | 
     return min(delays, default=None)
 
 
-def check_reach(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:
-    """Raise SceneError if a message may arrive at an instant that no 64-bit tick can stand for."""
+def check_latest_arrival_fits(scene: Scene, nodes: Mapping[str, Node], run_ticks: int) -> None:
+    """Raise SceneError if a message could arrive at an instant beyond the range of 64-bit ticks."""
     delays = sum(channel.delay_ticks for node in nodes.values() for channel in node.wires)
     jitter = sum(round(wire.jitter_s * scene.ticks_per_s) for wire in scene.wires)
     if run_ticks + delays + jitter >= MAX_TICK:

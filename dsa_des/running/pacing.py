@@ -20,7 +20,7 @@ _SLOWEST, _FASTEST = 1e-6, 1e12
 
 
 def parse_factor(text: str, option: str = "--realtime") -> float:
-    """Return the factor of ``--realtime``, or of another option.
+    """Return the speed factor that is given as text for ``--realtime``, or for another option.
 
     A `UsageError` says so if it is not a finite number above 0.
     """
@@ -38,7 +38,7 @@ def parse_factor(text: str, option: str = "--realtime") -> float:
 
 @dataclass
 class Pacer:
-    """Waits until the wall clock has come as far as the simulation, and notes when it is behind.
+    """Holds a simulation to `factor` simulated seconds per wall second, and measures its lag.
 
     `factor` are simulated seconds per second; `now` is the clock, s, and `sleep` waits so many
     seconds.
@@ -63,7 +63,7 @@ class Pacer:
         return LONGEST_WAIT_S * self.factor
 
     def start(self) -> None:
-        """Let simulated time 0 be now."""
+        """Make the present wall-clock time that of simulated time 0."""
         self._started = self.now()
 
     def __call__(self, time_s: float) -> None:
@@ -89,7 +89,7 @@ class Pacer:
         }
 
     def sentence(self) -> str:
-        """Return the report for the terminal."""
+        """Return the report as a sentence for the terminal."""
         said = self.report()
         return (
             f"paced at {self.factor:g} x wall clock: behind by at most "

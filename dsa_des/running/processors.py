@@ -41,7 +41,7 @@ Deliver = Callable[[Message, Any], None]
 
 @dataclass(eq=False)
 class Processing(Message):
-    """What became of messages at a processor; ``tick`` is the instant of the outcome."""
+    """What happened to messages at a shared processor (done, dropped, skipped), at ``tick``."""
 
     row_table: ClassVar[str] = "processing"
 
@@ -66,7 +66,7 @@ class Processing(Message):
 
 
 class Service:
-    """How long a processor works on each message: draws are keyed by block and instant.
+    """Draws how long a processor works on each message, keyed by block and instant.
 
     From each of `from_ticks` on, what enters is worked on as the next of `parameters` say. A
     `ValueError` says so if that is shorter than one tick.
@@ -88,8 +88,8 @@ class Service:
         if self._least.min() < 1:
             raise ValueError(f"processors.{name}: service_s is shorter than one tick")
 
-    def ticks(self, blocks: Iterable[str], entered: IntArray) -> IntArray:
-        """Return the time for each message, by its block and the tick at which it entered."""
+    def service_ticks(self, blocks: Iterable[str], entered: IntArray) -> IntArray:
+        """Return messages' service times in ticks, by their block and tick of entry."""
         of = np.searchsorted(self._from_ticks, entered, side="right") - 1
         least: IntArray = self._least[of]
         if not self._spread.any():
@@ -102,7 +102,7 @@ class Service:
 
 @dataclass(eq=False)
 class _Entry:
-    """What one block sent over one output at a time: a job for each instant."""
+    """A message that a block sent over one output, as one job for each instant in it."""
 
     block: str
     message: Message
@@ -119,7 +119,7 @@ class _Entry:
         return cls(block, message, deliver, np.append(first, len(message)), done)
 
     def send(self) -> None:
-        """Deliver the jobs whose end is known, once."""
+        """Deliver, once, the rows of the jobs whose end is known."""
         if len(known := np.flatnonzero(self.done < _NEVER)) == 0:
             return
         done = np.repeat(self.done, np.diff(self.bounds))
@@ -142,7 +142,7 @@ class _Job:
 
 
 class Processor:
-    """One processor and the line of those that wait for it.
+    """One shared processor and the queue of jobs that wait for it.
 
     Invariants: it works on at most one message at a time; messages of one instant enter in the
     order of their blocks' names; whatever is done at an instant has left before any block of that
@@ -182,16 +182,16 @@ class Processor:
         #: In closed form, jobs that are done after the last window: entered, started, done, block.
         self._under_way = (*[np.empty(0, dtype=np.int64)] * 3, np.empty(0, dtype=object))
 
-    def refuses(self, block: str) -> bool:
-        """Whether a scan at this instant is to be left out because the processor is busy."""
+    def skip_if_busy(self, block: str) -> bool:
+        """Return whether a scan is skipped now as the processor is busy, and record that if so."""
         if not self._policy.skips(self._working is not None):
             return False
         now = int(self._env.now)
-        self._note(_Job(block, now), now, SKIPPED)
+        self._note_outcome(_Job(block, now), now, SKIPPED)
         return True
 
     def open_window(self, start: int, end: int) -> None:
-        """Let the messages of [start, end) be served once all blocks have sent theirs."""
+        """Schedule the messages of [start, end) to be served after all blocks have sent theirs."""
         if self._window_priority is None or self._window == (start, end):
             return  # each of its blocks says so
         self._window = start, end
@@ -199,7 +199,7 @@ class Processor:
         wake_up.callbacks.append(lambda event: self._serve_window(end))
 
     def submit(self, block: str, message: Message, deliver: Deliver) -> None:
-        """Queue a block's message on one output; `deliver` is called when work on it ends."""
+        """Queue a block's message; `deliver` is called with its rows when work on them ends."""
         if self._window_priority is None and not self._entries:
             WakeUp(self._env, 0, ENTRY_PRIORITY).callbacks.append(self._serve_instant)
         self._entries.append(_Entry.from_message(block, message, deliver))
@@ -213,13 +213,13 @@ class Processor:
     def _serve_instant(self, event: simpy.Event) -> None:
         entries, now = self._take_entries(), int(self._env.now)
         ticks = np.full(len(entries), now, dtype=np.int64)
-        services = self._service.ticks([entry.block for entry in entries], ticks).tolist()
+        services = self._service.service_ticks([entry.block for entry in entries], ticks).tolist()
         jobs = zip(entries, services, strict=True)
         self._enter(now, [_Job(entry.block, now, service, entry) for entry, service in jobs])
         self._send_done()
 
     def _on_job_done(self, event: simpy.Event) -> None:
-        self._finish(int(self._env.now))
+        self._finish_jobs_until(int(self._env.now))
         self._send_done()
 
     # -- the line ------------------------------------------------------------------------------
@@ -227,13 +227,13 @@ class Processor:
     def _enter(self, now: int, jobs: Iterable[_Job]) -> None:
         for job in jobs:
             if self._policy.skips(self._working is not None or bool(self._line)):
-                self._note(job, now, SKIPPED)  # another block of this instant was first
+                self._note_outcome(job, now, SKIPPED)  # another block of this instant was first
                 continue
             gone: Any = self._policy.dropped(tuple(self._line), job)
             for left in gone:
                 if left is not job:
                     self._line.remove(left)
-                self._note(left, now, DROPPED)
+                self._note_outcome(left, now, DROPPED)
             if job not in gone:
                 self._line.append(job)
         if self._working is None:
@@ -250,24 +250,24 @@ class Processor:
         if self._window_priority is None:
             WakeUp(self._env, job.service, DONE_PRIORITY).callbacks.append(self._on_job_done)
 
-    def _finish(self, until: int) -> None:
+    def _finish_jobs_until(self, until: int) -> None:
         while self._working is not None and self._free_from <= until:
             job, now, self._working = self._working, self._free_from, None
-            self._note(job, now, DONE)
+            self._note_outcome(job, now, DONE)
             self._begin(now)
 
-    def _note(self, job: _Job, tick: int, outcome: int) -> None:
+    def _note_outcome(self, job: _Job, tick: int, outcome: int) -> None:
         numbers = (tick, job.entered, job.started, len(self._line), outcome)
         self._notes.append((job.block, numbers))
 
     def close_window(self) -> None:
-        """Record when the jobs of a window entered, started and ended."""
+        """Record the outcomes of jobs since the last call: when each entered, started and ended."""
         if notes := self._notes:
             self._notes = []
             self._record_all([block for block, _ in notes], *np.array([n for _, n in notes]).T)
 
     def _send_done(self) -> None:
-        """Send the jobs whose end is known."""
+        """Deliver the messages of jobs whose end is now known."""
         leaving, self._leaving = self._leaving, {}
         for entry in leaving:
             entry.send()
@@ -293,9 +293,9 @@ class Processor:
         number = np.concatenate([*map(np.arange, map(len, ticks)), np.empty(0, dtype=np.int64)])
         number = number[order].astype(np.int64)
         blocks = np.array([*(entry.block for entry in entries), ""], dtype=object)[of]
-        service = self._service.ticks(blocks, tick)
+        service = self._service.service_ticks(blocks, tick)
         if type(self._policy) is QueuePolicy:
-            done = self._end_ticks(tick, service, blocks, end)
+            done = self._serve_in_order(tick, service, blocks, end)
             for n, entry in enumerate(entries):
                 entry.done[number[of == n]] = done[of == n]
                 entry.send()
@@ -305,15 +305,15 @@ class Processor:
             _Job(*row) for row in zip(*(_list_of_integers(values) for values in rows), strict=True)
         ]
         for now, group in groupby(jobs, key=lambda job: job.entered):
-            self._finish(now)
+            self._finish_jobs_until(now)
             self._enter(now, group)
-        self._finish(end - 1)
+        self._finish_jobs_until(end - 1)
         self._send_done()
 
-    def _end_ticks(
+    def _serve_in_order(
         self, tick: IntArray, service: IntArray, blocks: np.ndarray, end: int
     ) -> IntArray:
-        """Return when each job is done: it starts when it has entered and that before is done."""
+        """Return the ticks at which jobs end, in order of entry; record those before `end`."""
         worked = np.cumsum(service)
         idle = np.maximum(tick, self._free_from) - (worked - service)
         ends: IntArray = np.maximum.accumulate(idle) + worked

@@ -15,10 +15,10 @@ from dsa_des.files.output_file import write_file
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.record.failure_counts import failure_sentences
-from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import write_run_json
 from dsa_des.record.sinks import ObserverSink, call_or_note
+from dsa_des.record.table_metadata import metadata_of_run
 from dsa_des.record.version import __version__
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.reports import draw_all_reports, load_reports, notes_of_scene, warn_of_long_run
@@ -71,13 +71,13 @@ def record_run(
     observers = ObserverSink(
         (observer for report in reports for observer in report.observers(simulation)), notes
     )
-    with target.writing() as folder:
+    with target.write_then_rename() as folder:
         # Arrow takes longer to import than most scenes to check: not before all is well.
         from dsa_des.record.arrow import ParquetSink
 
         scene_text = to_toml((recorded_as or loaded).resolved())
         messages = simulation.recorded_messages()
-        said = notes_of(messages, scene_text, loaded.seed, simulation.ticks_per_s)
+        said = metadata_of_run(messages, scene_text, loaded.seed, simulation.ticks_per_s)
         tables = ParquetSink(folder, said)
         recorder.sinks += [tables, observers]
         started = time.perf_counter()
@@ -114,7 +114,7 @@ def record_run(
 def summarise_run(
     observers: ObserverSink, outcome: Outcome, target: Path | None, notes: list[str]
 ) -> dict[str, Any]:
-    """Return what a run came to: what observers and blocks say of it."""
+    """Return a run's summary: sections of observers, blocks; failures; simulated and CPU time."""
     return {
         **observers.result(),
         **(call_or_note("the summary of the blocks", notes, lambda: outcome.report) or {}),
@@ -149,7 +149,7 @@ def run_json_content(
         "versions": {
             "dsa_des": __version__,
             "python": sys.version.split()[0],
-            **_versions(),
+            **_library_versions(),
         },
         "look_ahead": outcome.windowed,
         "rows": recorder.rows,
@@ -159,14 +159,14 @@ def run_json_content(
 
 
 @cache
-def _versions() -> dict[str, str]:
-    """Return the versions of the libraries; reading them takes longer than a small run."""
+def _library_versions() -> dict[str, str]:
+    """Return library → its installed version, read once per process."""
     return {name: version(name) for name in _VERSIONS_OF}
 
 
 @contextmanager
 def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[float], None] | None]:
-    """Show a progress bar on a terminal; nothing in a pipe."""
+    """Show a progress bar if on a terminal; yield what moves it to a simulated time, s, or None."""
     if silent or not sys.stderr.isatty():
         yield None
         return

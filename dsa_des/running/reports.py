@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from dsa_des.block.component import RunEnd
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_installed
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, call_or_note
 from dsa_des.running.grain import blocks_held_back
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.graph import cycle_numbers
+from dsa_des.scene.graph import loop_number_by_block
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shorten
@@ -27,7 +27,7 @@ _LONGEST = 500
 
 
 def notes_of_scene(simulation: Simulation) -> list[str]:
-    """Return what there is to note of a scene that is set up, but for what it acknowledges.
+    """Return the notes on a scene that is set up, without those that its blocks acknowledge.
 
     First what was done to it that its files do not show, then keys that change nothing, then what
     its blocks and their times have to say of their own values.
@@ -40,15 +40,17 @@ def notes_of_scene(simulation: Simulation) -> list[str]:
         notes += [f"blocks.{name}: {text}" for text in component.p.ineffective_key_notes()]
         for text in call_or_note(f"blocks.{name}: warnings", notes, component.warnings) or ():
             notes.append(f"blocks.{name}: {shorten(str(text), _LONGEST)}")
-        notes += [f"blocks.{name}: {text}" for text in _notes_of_idle_options(simulation, name)]
-    notes += _notes_of_vain_work(simulation)
-    for text in _notes_of_stretches(simulation, notes):
+        notes += [
+            f"blocks.{name}: {text}" for text in _notes_of_ineffective_times(simulation, name)
+        ]
+    notes += _notes_of_useless_blocks(simulation)
+    for text in _notes_after_changes(simulation, notes):
         notes.append(text)
-    return _drop_acknowledged(scene, [*notes, *_blocks_that_slow(simulation)])
+    return _drop_acknowledged(scene, [*notes, *_notes_of_slowing_blocks(simulation)])
 
 
-def _notes_of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str]:
-    """Yield what is to be noted of blocks only after something has changed."""
+def _notes_after_changes(simulation: Simulation, said: list[str]) -> Iterator[str]:
+    """Yield notes on blocks that apply only after a timed change."""
     scene = simulation.scene
     for number, stretch in enumerate(scene.stretches, start=1):
         before = simulation.stretches[number - 1]
@@ -66,12 +68,12 @@ def _notes_of_stretches(simulation: Simulation, said: list[str]) -> Iterator[str
         yield (
             f"blocks.{name}: goes on by what its neighbours said at the start, though from "
             f"{float(scene.stretches[number - 1].from_s):g} s they say otherwise: "
-            f"{scene.classes[name].path()} does not say what it remembers"
+            f"{scene.classes[name].import_path()} does not say what it remembers"
         )
 
 
-def _notes_of_vain_work(simulation: Simulation) -> Iterator[str]:
-    """List blocks that repeat another one's work, or whose messages nobody receives or records."""
+def _notes_of_useless_blocks(simulation: Simulation) -> Iterator[str]:
+    """Yield notes on blocks that repeat another's work or send what nobody receives or records."""
     scene, graph = simulation.scene, simulation.scene.graph
     first: list[str] = []
     for name, component in simulation.components.items():
@@ -96,8 +98,8 @@ def _notes_of_vain_work(simulation: Simulation) -> Iterator[str]:
             first.append(name)
 
 
-def _notes_of_idle_options(simulation: Simulation, name: str) -> Iterator[str]:
-    """List times of a block by which it does nothing in this run, or not what they say."""
+def _notes_of_ineffective_times(simulation: Simulation, name: str) -> Iterator[str]:
+    """Yield notes on offsets, jitter, latencies without effect in this run or not fully obeyed."""
     scene, ends_s = simulation.scene, simulation.duration_s
     component = simulation.components[name]
     spec = component.clock_of(component.p)
@@ -113,10 +115,10 @@ def _notes_of_idle_options(simulation: Simulation, name: str) -> Iterator[str]:
         yield f"latency_s is {float(latency_s):g}: nothing it sends arrives in {float(ends_s):g} s"
 
 
-def _blocks_that_slow(simulation: Simulation) -> list[str]:
-    """Return which blocks keep others from looking ahead, in a loop or behind them."""
+def _notes_of_slowing_blocks(simulation: Simulation) -> list[str]:
+    """Return notes on blocks that make others run scan by scan, in a loop or downstream."""
     scene = simulation.scene
-    looped = sorted(cycle_numbers(scene.graph))
+    looped = sorted(loop_number_by_block(scene.graph))
     windowed = [name for name, node in simulation.nodes.items() if node.windowed]
     kept = blocks_held_back(scene, windowed)
     # A window of a loop holds all blocks, so one outside of the loop counts as well.
@@ -124,14 +126,15 @@ def _blocks_that_slow(simulation: Simulation) -> list[str]:
         f"{', '.join(kept)} run"
     )  # fmt: skip
     return [
-        f"blocks.{name}: {scene.classes[name].path()} {why}: because of it {what} scan by scan, "
+        f"blocks.{name}: {scene.classes[name].import_path()} {why}: because of it {what} scan by "
+        f"scan, "
         "which is slow"
         for name, why in simulation.slow.items()
     ]
 
 
 def notes_of_loading(scene: Scene) -> list[str]:
-    """Return what was done to a scene that its files do not show."""
+    """Return notes on how loading changed a scene, such as parameters that a swap dropped."""
     dropped: dict[str, list[str]] = {}
     for key in scene.dropped:
         block, _, parameter = key.rpartition(".")
@@ -153,7 +156,7 @@ def _drop_acknowledged(scene: Scene, notes: list[str]) -> list[str]:
 
 
 def _note_begins_with(note: str, head: str, begin: str) -> bool:
-    """Return whether a note on `head` begins so, or what it says of a file, an aircraft, a key."""
+    """Return whether a note on `head` begins with `begin`, or has it after a colon."""
     if not begin or not note.startswith((f"{head}: ", f"{head}.")):
         return False
     rest = note[len(head) :].lstrip(":. ")
@@ -173,7 +176,7 @@ _MANY_SCANS = 1e7
 
 
 def warn_of_long_run(simulation: Simulation) -> None:
-    """Say on standard error that a run will take long, before it does."""
+    """Print a note on standard error if a run has very many scans."""
     if simulation.scans > _MANY_SCANS:
         message = f"note: {float(simulation.duration_s):.4g} s of this scene are about "
         say(f"{message}{simulation.scans:.2g} scans", err=True)
@@ -181,7 +184,7 @@ def warn_of_long_run(simulation: Simulation) -> None:
 
 @dataclass(frozen=True)
 class Change:
-    """A number of `Report.compare` as tables show it.
+    """How tables show one number of what `Report.compare` returns: heading, key and format.
 
     Parameters
     ----------
@@ -218,7 +221,7 @@ class Difference:
 
 
 class Report(Protocol):
-    """What a report plug-in can do."""
+    """Interface of a report plug-in, which summarises, compares and draws runs."""
 
     #: Numbers of `compare` that are worth a column, the most telling one first.
     changes: Sequence[Change]
@@ -226,19 +229,19 @@ class Report(Protocol):
     difference: Difference
 
     def observers(self, simulation: "Simulation") -> list[Observer]:
-        """Return running summaries over the recorded rows of this run."""
+        """Return the observers that summarise this run's rows while they are recorded."""
 
     def show(self, console: Any, summary: dict[str, Any]) -> None:
         """Print the summary on a ``rich.console.Console`` that reads no markup."""
 
     def compare(self, reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-        """Return what changed from one run's recorded tables to another's."""
+        """Return the differences between the recorded tables of two runs, by name."""
 
     def describe_changes(self, changes: Mapping[str, Any]) -> list[str]:
-        """Return what of `compare`'s result is better said in words."""
+        """Return sentences on what `compare` found that words say better than numbers."""
 
     def draw(self, simulation: "Simulation", folder: Path, summary: dict[str, Any]) -> list[Path]:
-        """Draw figures from the Parquet tables in `folder` into it and return their paths.
+        """Draw figures from Parquet tables in `folder`, write them there and return the paths.
 
         The run is complete when this is called, and may be large: tables are read in pieces.
         """
@@ -246,13 +249,13 @@ class Report(Protocol):
 
 def load_reports() -> list[Report]:
     """Return one instance of every registered report, in the order of their names."""
-    return [load_installed(point)() for point in entry_points_of(REPORTS).values()]
+    return [load_unnamed_entry_point(point)() for point in entry_points_of(REPORTS).values()]
 
 
 def draw_all_reports(
     reports: Iterable[Report], simulation: "Simulation", folder: Path, summary: dict[str, Any]
 ) -> list[str]:
-    """Let every report draw its figures of a finished run, and return what went wrong.
+    """Let every report draw figures of a finished run; return a note on each that failed.
 
     A figure that fails takes nothing with it: the run is complete without.
 

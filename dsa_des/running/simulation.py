@@ -20,18 +20,18 @@ from dsa_des.block.component import Component, may_end_its_run
 from dsa_des.block.foreign_calls import error_with_line, is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
-from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, sum_runs
+from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, sum_counts_over_runs
 from dsa_des.record.recording import NotRecordedError, Recorder
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, plan_timing_effects
 from dsa_des.running.events import Abort
-from dsa_des.running.grain import longest_window, refuse_endless_work, scans_per_run
+from dsa_des.running.grain import longest_window_ticks, refuse_endless_work, scans_per_run
 from dsa_des.running.nodes import (
     build_nodes,
     build_processors,
-    check_reach,
+    check_latest_arrival_fits,
     connect_nodes,
-    horizon_ticks,
+    shortest_delay_ticks,
 )
 from dsa_des.running.pacing import Pacer
 from dsa_des.running.processors import Processing
@@ -46,7 +46,7 @@ _MOST_SCANS_AGAIN = 20_000
 
 @dataclass
 class Outcome:
-    """What a run came to.
+    """The result of a run: its length, CPU time, final components and failures.
 
     Of runs that share a timeline, `duration_s` is the longest it may be. `windowed` are the blocks
     that ran in look-ahead windows; `components` speak for the whole run. `failures_by_run` is what
@@ -61,12 +61,12 @@ class Outcome:
 
     @cached_property
     def failure_counts(self) -> FailureCounts:
-        """What blocks could not do, over all runs."""
-        return sum_runs(self.failures_by_run, slice(None))
+        """Block → kind of failure → (failed, attempts), summed over all runs."""
+        return sum_counts_over_runs(self.failures_by_run, slice(None))
 
     @cached_property
     def report(self) -> dict[str, Any]:
-        """Sections of the summary that blocks gave (`Component.report`), made when asked for."""
+        """Summary sections that blocks return from `Component.report`, made at the first access."""
         sections: dict[str, Any] = {}
         for component in self.components.values():
             try:
@@ -80,7 +80,7 @@ class Outcome:
 
 
 class Simulation:
-    """A scene made ready to run once.
+    """A scene that is set up and can be run once.
 
     By default there is one run of the scene (`timeline`), and windows are sized by the number of
     targets: `window` is the most scans of all clocks together in one; 1 runs every block scan by
@@ -133,32 +133,32 @@ class Simulation:
         self.timeline.set_length(self.components, self.duration_s)
         #: How the runs lie in time, and when they end.
         self.runs = self.timeline.runs
-        self._check_ends()
+        self._refuse_early_ends_with_processors()
         self._processors = build_processors(timeline, grain, self.env, self._record)
         self.nodes = build_nodes(
             self, self.timeline, self.stretches, grain, self._processors, shuffle_ties
         )
         connect_nodes(scene, self.nodes, self.timeline)
-        check_reach(scene, self.nodes, self.runs.run_ticks)
+        check_latest_arrival_fits(scene, self.nodes, self.runs.run_ticks)
         #: How many scans of all clocks together a run has, about.
         self.scans = scans_per_run(self.nodes, self.runs)
         refuse_endless_work(scene, self.scans, float(self.duration_s))
         rewinder = None
         if grain.rewinds:
             rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, self.runs)
-        longest = longest_window(self.nodes, self.runs, window)
+        longest = longest_window_ticks(self.nodes, self.runs, window)
         #: Which windows the run goes through.
         self.windows: Windows = self.timeline.windows(
-            longest, self.scans, horizon_ticks(self.nodes, grain.cut_edges), rewinder
+            longest, self.scans, shortest_delay_ticks(self.nodes, grain.cut_edges), rewinder
         )
 
     @property
     def timing_plan(self) -> list[Planned]:
-        """Which effects of time exist in this run: latencies, wires, clocks, processors."""
+        """Which timing effects (latency, wire, clock) are simulated at the run's start, and why."""
         return self.timing_plan_of(0)
 
     def timing_plan_of(self, stretch: int) -> list[Planned]:
-        """Return the same of a stretch of the scene, 0 for that at its start."""
+        """Return the timing effects simulated in a stretch of the scene and why; 0 is the first."""
         scene = self.scene.stretches[stretch - 1].scene if stretch else self.scene
         return plan_timing_effects(scene, everything=self._everything)
 
@@ -182,7 +182,7 @@ class Simulation:
         self._open_recorder()
         going = range(0)
         if pacer is not None:
-            self.windows.limit(int(pacer.longest_window_s * self.ticks_per_s))
+            self.windows.limit_length(int(pacer.longest_window_s * self.ticks_per_s))
             pacer.start()
         else:
             self.windows.next_instant = self._next_instant
@@ -192,7 +192,7 @@ class Simulation:
             if self.runs.going != going:
                 going = self.runs.going
                 self._start(going)
-            if self.runs.is_over(window.start):
+            if self.runs.have_all_ended(window.start):
                 if going.stop == self.runs.count:
                     break
                 self.windows.commit(window, None)  # nothing is left to run in it
@@ -204,14 +204,16 @@ class Simulation:
             if failure is not None:
                 self._raise(failure)
             if self.recorder is not None:
-                self._recorded(self.recorder.advance, *self.runs.final_before(final, going))
+                self._call_recorder(
+                    self.recorder.flush_if_large, *self.runs.rows_complete_before(final, going)
+                )
             if pacer is not None:
                 pacer(final / self.ticks_per_s)
             if progress is not None:
                 progress(final / self.ticks_per_s)
         if self.recorder is not None:
-            self._recorded(self.recorder.close)
-        self.components = {name: node.last for name, node in self.nodes.items()}
+            self._call_recorder(self.recorder.close)
+        self.components = {name: node.current_component for name, node in self.nodes.items()}
         if self.runs.early and self.runs.count == 1:
             self.duration_s = Fraction(int(self.runs.ends[0]), self.ticks_per_s)
             for component in self.components.values():
@@ -229,7 +231,7 @@ class Simulation:
         )
 
     def _start(self, runs: range) -> None:
-        """Start the processes of all blocks for runs; time begins again, and SimPy's never does."""
+        """Start all blocks' processes for the runs, in a new SimPy environment if not the first."""
         if runs.start > 0:
             self.env = simpy.Environment(initial_time=0)
         for node in self.nodes.values():
@@ -238,13 +240,15 @@ class Simulation:
     def _next_instant(self, tick: int, ahead: int) -> int:
         soonest = MAX_TICK
         for node in self.nodes.values():
-            soonest = min(soonest, node.quiet_until(tick, ahead))
+            soonest = min(soonest, node.next_run_bound(tick, ahead))
             if soonest <= tick:
                 break  # as most often
         return soonest
 
-    def _check_ends(self) -> None:
-        """Refuse what ends its run where messages wait for a processor: they would be lost."""
+    def _refuse_early_ends_with_processors(self) -> None:
+        """Raise SceneError if a block may end its run early in a scene with shared processors,
+        whose waiting messages would be lost.
+        """
         if self.scene.processors:
             ending = [n for n, cls in sorted(self.scene.classes.items()) if may_end_its_run(cls)]
             said = "it ends its run early, which a scene with shared processors does not allow"
@@ -254,7 +258,7 @@ class Simulation:
                 )
 
     def _check_ready(self) -> None:
-        """Refuse to run what waits for a host, or has run."""
+        """Raise an error if a block still needs a host program or the simulation ran before."""
         hosted = [
             self.scene.problem(f"blocks.{name}.type", component.needs_host)
             for name, component in self.components.items()
@@ -282,8 +286,8 @@ class Simulation:
                 replicas=self.timeline.says_replica, platforms=self.platforms,
             )  # fmt: skip
 
-    def _recorded(self, call: Callable[..., None], *arguments: Any) -> None:
-        """Let the recorder hand on rows; what it cannot record is its block's failure."""
+    def _call_recorder(self, call: Callable[..., None], *arguments: Any) -> None:
+        """Call a recorder method, and raise what it cannot record as the block's failure."""
         try:
             call(*arguments)
         except NotRecordedError as error:
@@ -297,7 +301,7 @@ class Simulation:
             self.recorder.record(block, message)
 
     def run_window(self, window: Window) -> Failure | None:
-        """Run every block over a window, and return what one raised."""
+        """Run every block over a window, and return the first failure of a block, or None."""
         self.window, self.failure = window, None
         for node in self.nodes.values():
             node.open_window(window)
@@ -314,7 +318,7 @@ class Simulation:
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
     ) -> None:
-        """Note that a block raised when it handled `ticks`, and leave SimPy."""
+        """Record a block's error at `ticks`, and leave SimPy unless the window is provisional."""
         if self.failure is None:  # a provisional window goes on; the first failure counts
             time_s, number = int(ticks[0]) / self.ticks_per_s, scan if scan >= 0 else None
             said = block_failure(node.component, time_s, error, number)
@@ -323,7 +327,7 @@ class Simulation:
             raise Abort
 
     def _raise(self, failure: Failure) -> None:
-        """Raise what a block raised; its exact instant is found by running scan by scan again."""
+        """Raise a block's failure, if possible with its exact instant from a rerun scan by scan."""
         for component in self.components.values():
             component.close()
         before = self.scans * int(failure.ticks[0]) / self.runs.run_ticks
@@ -340,6 +344,8 @@ class Simulation:
 def block_failure(
     component: Component, time_s: float, error: BaseException, scan: int | None = None
 ) -> BlockFailure:
-    """Return the error message for an exception that a block raised at an instant."""
+    """Return a `BlockFailure` that describes the exception which a block raised at an instant."""
     cls = type(component)
-    return BlockFailure(component.name, cls.path(), time_s, scan, error_with_line(error, cls))
+    return BlockFailure(
+        component.name, cls.import_path(), time_s, scan, error_with_line(error, cls)
+    )

@@ -24,7 +24,7 @@ from dsa_des.stretches.stretched_block import StretchedBlock
 from dsa_des.time.clock import ClockSpec
 from dsa_des.time.randomness import Streams
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 def _zero_jitter_draw(number: int) -> Callable[[IntArray], FloatArray]:
@@ -32,7 +32,7 @@ def _zero_jitter_draw(number: int) -> Callable[[IntArray], FloatArray]:
 
 
 class Timeline:
-    """One run of a scene; with `everything`, clocks draw their jitter also where it is 0."""
+    """Clocks, channels, outages, windows of a run; `everything` has clocks draw jitter at 0 too."""
 
     count = 1
     says_replica = False
@@ -46,11 +46,11 @@ class Timeline:
         self.streams = Streams(self.seeds)
 
     def parameters(self, name: str) -> Any:
-        """Return what a block is made with."""
+        """Return the parameters with which a block is built."""
         return self.scene.blocks[name].parameters
 
     def set_length(self, components: Mapping[str, Component], duration_s: Fraction) -> None:
-        """Learn the blocks, which are set up, and how long a run lasts."""
+        """Set the number and the length of the runs, once the blocks are set up."""
         ticks = duration_s * self.scene.ticks_per_s
         self.runs = Runs(self.count, -(-ticks.numerator // ticks.denominator))
 
@@ -71,7 +71,7 @@ class Timeline:
     def _clock_changes(
         self, name: str, component: Component, specs: list[ClockSpec]
     ) -> list[tuple[int, list[ClockSpec]]]:
-        """Return from when on a block's clock is another one, and what each run says of it then."""
+        """Return (tick, clock of each run) per stretch at whose start a block's clock changes."""
         changes: list[tuple[int, list[ClockSpec]]] = []
         if not self.scene.stretches:
             return changes
@@ -81,8 +81,8 @@ class Timeline:
                 specs = later
         return changes
 
-    def pulse(self, component: Component) -> RunClock | None:
-        """Return when a block is woken though nothing comes, or None where it never is."""
+    def periodic_wake_clock(self, component: Component) -> RunClock | None:
+        """Return the clock that wakes a block regularly even without arrivals; None if none."""
         every_s = component.acts_every_s()
         if every_s is None:
             return None
@@ -92,7 +92,7 @@ class Timeline:
     def clock_specs(
         self, name: str, component: Component, stretch: int | None = None
     ) -> list[ClockSpec]:
-        """Return what each run says of a block's clock; none where it has none of its own.
+        """Return each run's specification of a block's scan clock; empty if it has none.
 
         That is at the start, or in a stretch.
         """
@@ -103,7 +103,7 @@ class Timeline:
         return [] if spec is None else [spec]
 
     def channel(self, wires: Sequence[Wire], scan_delay_ticks: int) -> Channel:
-        """Return the receiving end of a wire, with its faults.
+        """Return the channel of a wire, with its delay and its random loss and lateness.
 
         `wires` are what the scene says of it in each stretch.
         """
@@ -127,24 +127,24 @@ class Timeline:
         return np.array([t * self.scene.ticks_per_s for t in instants_s], dtype=np.int64)
 
     def outages(self, name: str) -> Outages | None:
-        """Return when a block is out, or None where it never is."""
+        """Return the random outages of a block in each run; None if it can have none."""
         failing = [one for one in self.scene.outages if name in one.blocks]
         if not failing:
             return None
         return Outages(failing, self.streams, self.runs, self.scene.ticks_per_s)
 
     def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
-        """Return what handles the wakes of a block in each stretch; None where one does in all."""
+        """Return what hands wakes to each stretch's instance; None if one serves all stretches."""
         if all(one is instances[0] for one in instances):
             return None
         return StretchedBlock(self.from_ticks, instances)
 
     def grain(self, window: int | None) -> Grain:
-        """Return at which grain the blocks run; see `Simulation` for the parameters."""
+        """Return which blocks run in windows or scan by scan; parameter as for `Simulation`."""
         return choose_grain(self.scene, window)
 
     def runner(self, component: Component) -> Any:
-        """Return what handles the wakes of a block: itself, or what stands in for it."""
+        """Return the object that handles the wakes of a block: the block itself, or a stand-in."""
         return component
 
     def windows(
@@ -154,7 +154,7 @@ class Timeline:
         horizon_ticks: int | None,
         rewinder: Rewinder | None,
     ) -> Windows:
-        """Return the windows of all runs.
+        """Return the windows in which all runs are simulated, one after another.
 
         Each run has about so many `scans` of all clocks together. With `horizon_ticks`, feedback
         loops run in windows: before so long, nothing that is sent comes back; with a `rewinder`
@@ -165,11 +165,11 @@ class Timeline:
         return Windows(self.runs, longest_ticks, horizon_ticks)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
-        """Take note that all has run, and return the blocks that speak for the whole run."""
+        """Note that all has run, and return the components that report on the whole run."""
         return components
 
     def failure_counts(self, components: Mapping[str, Component]) -> FailuresByRun:
-        """Return what blocks could not do in each run, once they are finished."""
+        """Return block → failure → counts in each run, once the blocks are finished."""
         return {
             n: counts_by_run(of.failure_counts(), self.runs.count) for n, of in components.items()
         }

@@ -26,11 +26,11 @@ from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.channel import Channel
 from dsa_des.time.run_clock import RunClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 class Window(NamedTuple):
-    """The ticks [start, end) that run at a time.
+    """A span of ticks [start, end) that is simulated in one go.
 
     All of a provisional window runs at its start, and may be undone: what a block raises in it
     counts only when the windows let it stand. Blocks that no loop leads to run from its start up to
@@ -45,7 +45,7 @@ class Window(NamedTuple):
 
 @dataclass(frozen=True)
 class Failure:
-    """What a block raised in a window: as it is said, as it was, and at which instants."""
+    """What a block raised in a window: error to show, original exception and instants handled."""
 
     said: BlockFailure
     cause: BaseException
@@ -54,45 +54,45 @@ class Failure:
 
 @dataclass
 class Demand:
-    """A clocked block downstream, and how long before its scan it needs our row."""
+    """A block downstream with a scan clock, and how many ticks before its scans it needs rows."""
 
     block: str
     clock: RunClock
     lead_ticks: int
 
     def instants_between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) at which this block needs a row.
+        """Return the instants in [start, end) at which the clocked block needs a row of ours.
 
         None of these rows would arrive after the end of the run, where the clock has no scan.
         """
         _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
-        return instants.later(-self.lead_ticks) if self.lead_ticks else instants
+        return instants.add_ticks(-self.lead_ticks) if self.lead_ticks else instants
 
 
 class RunningBlock(Protocol):
-    """A block as its run sees it; `runner` is what handles its wakes."""
+    """A block as its run sees it; `runner` is the object that handles its wakes."""
 
     runner: Any
 
     @property
     def name(self) -> str:
-        """Its name in the scene."""
+        """The block's name in the scene."""
 
     @property
     def component(self) -> Component:
-        """The block itself."""
+        """The block's component."""
 
     @property
     def state_objects(self) -> Sequence[object]:
-        """All objects whose attributes hold its state."""
+        """All objects whose attributes hold the block's state."""
 
     @property
     def wires(self) -> Sequence[Channel]:
-        """The wires into it."""
+        """The channels of the wires into the block."""
 
 
 class Windows:
-    """Windows up to the horizon, from the start of some runs to their end, then of the next runs.
+    """Cuts runs into windows no longer than the horizon, some runs to their end, then the next.
 
     Nothing that is sent in a window comes back in it. The horizon is the lookahead of conservative
     parallel simulation (Chandy and Misra, "Distributed simulation: a case study in design and
@@ -126,14 +126,14 @@ class Windows:
         self.start = 0
         self._ahead = 0  # up to when blocks before the loops have run
 
-    def limit(self, longest_ticks: int) -> None:
-        """Let no window be longer than this; called before the first."""
+    def limit_length(self, longest_ticks: int) -> None:
+        """Set the longest length of a window; to be called before the first window."""
         self.longest_ticks = min(self.longest_ticks, max(1, longest_ticks))
         if self.start == 0:
             self._begin(self.runs.going.start)
 
     def end_after(self, length_ticks: int) -> int:
-        """Return where a window of this length from `start` on ends."""
+        """Return the tick at which a window of this length from the current `start` ends."""
         return min(self.start + length_ticks, self.end_tick)
 
     def next(self) -> Window | None:
@@ -148,7 +148,7 @@ class Windows:
         return Window(self.start, min(self.end_after(length), self._ahead), ahead)
 
     def commit(self, window: Window, failure: Failure | None) -> int | None:
-        """Let a window that has run stand, or undo it; `failure` is what a block raised in it.
+        """Keep or undo a window that has run; `failure` is what a block raised in it.
 
         Returned is the tick before which everything is final, also the failure; None if the window
         does not stand, and what `next` gives is to be run instead.
@@ -165,7 +165,7 @@ _CONTAINERS = (list, dict, set, deque, np.ndarray)
 
 
 class _Copied(dict[type, bool]):
-    """Whether values of a class are copied: what a block might change in place."""
+    """Class → whether saving state copies its values, as a block might change them in place."""
 
     def __missing__(self, kind: type) -> bool:
         self[kind] = issubclass(kind, _CONTAINERS)
@@ -176,7 +176,7 @@ _copied = _Copied()
 
 
 class Rewinder:
-    """Takes all blocks, wires and the record of a run back to how they were.
+    """Saves and restores the state of all blocks, wires and the record of a run.
 
     Over the wires between `cut_edges` messages come back; `runs` forget ends that were undone.
     """
@@ -197,19 +197,19 @@ class Rewinder:
         self._channels = [channel for _, channel in into]
         self._feedback = [channel for name, channel in into if (channel.source, name) in cut_edges]
 
-    def watch(self) -> None:
-        """Record from now on what arrives over feedback wires."""
+    def record_feedback_arrivals(self) -> None:
+        """Start anew to record when messages arrive over feedback wires."""
         for channel in self._feedback:
-            channel.watch()
+            channel.record_pushed_arrivals()
 
-    def mark(self) -> None:
-        """Remember how everything is now."""
+    def save_state(self) -> None:
+        """Save the state of all blocks, wires and the record."""
         self._states = [_copy_state(vars(thing)) for thing in self._things]
         self._wires = [channel.state() for channel in self._channels]
         self._recorded = None if self._recorder is None else self._recorder.mark()
 
     def restore(self) -> None:
-        """Bring everything back to how it was at `mark`."""
+        """Restore the state that was saved last."""
         for thing, state in zip(self._things, self._states, strict=True):
             vars(thing).clear()
             vars(thing).update(_copy_state(state))
@@ -217,16 +217,16 @@ class Rewinder:
             channel.set_state(wire)
         if self._recorder is not None and self._recorded is not None:
             self._recorder.rewind(self._recorded)
-        self.watch()
+        self.record_feedback_arrivals()
 
-    def first_returned_arrival(self) -> int | None:
-        """Return when the first message arrives that came back since `watch` or `restore`."""
+    def first_feedback_arrival(self) -> int | None:
+        """Return the earliest feedback arrival tick since recording began; None if none came."""
         ticks = [channel.first_pushed_arrival() for channel in self._feedback]
         return min((tick for tick in ticks if tick is not None), default=None)
 
 
 class RewindingWindows(Windows):
-    """Windows beyond the horizon of a single run, in which nothing came back unseen."""
+    """Windows longer than the horizon, for one run, undone if a message came back inside them."""
 
     def __init__(
         self, runs: Runs, longest_ticks: int, horizon_ticks: int, rewinder: Rewinder
@@ -240,13 +240,13 @@ class RewindingWindows(Windows):
         self._careful = False  # whether they run no farther than the rest, after a failure
 
     def next(self) -> Window | None:
-        """Return what was right of the last window, or a new one.
+        """Return the valid part of an undone window, or a new one; None when the run is over.
 
         It may be undone if it is longer than the horizon, or blocks run ahead in it.
         """
         if self._right is not None or self.start >= self.end_tick:
             return self._right
-        length = max(self._length or self._restart_ticks(), self._least)
+        length = max(self._length or self._restart_length_ticks(), self._least)
         end = self.end_after(min(length, self.longest_ticks))
         ahead = end if self._careful else self.end_after(self.longest_ticks)
         if self._ahead > self.start:
@@ -254,13 +254,13 @@ class RewindingWindows(Windows):
             end, ahead = min(end, self._ahead), self.start
         provisional = max(end - self._horizon, ahead) > self.start
         if provisional:
-            self._rewinder.mark()
-        self._rewinder.watch()
+            self._rewinder.save_state()
+        self._rewinder.record_feedback_arrivals()
         return Window(self.start, end, ahead, provisional)
 
     def commit(self, window: Window, failure: Failure | None) -> int | None:
-        """Undo a window inside of which a message came back."""
-        back = self._rewinder.first_returned_arrival()
+        """Keep a window that has run; undo it if a message came back in it or a block failed."""
+        back = self._rewinder.first_feedback_arrival()
         early = window.end if back is None else back
         if failure is not None and window.ahead > window.end:
             # Perhaps it lies beyond the window: again, and nobody runs ahead.
@@ -282,19 +282,21 @@ class RewindingWindows(Windows):
         self._ahead = max(self._ahead, window.ahead)
         self._careful = False
         if back is None:
-            self._length = min(2 * (self._length or self._restart_ticks()), self.longest_ticks)
+            self._length = min(
+                2 * (self._length or self._restart_length_ticks()), self.longest_ticks
+            )
         else:  # what comes back often comes regularly; at first, or after a hurry, start small
-            length = max(1, back - self._came) if self._came else self._restart_ticks()
+            length = max(1, back - self._came) if self._came else self._restart_length_ticks()
             self._length = min(length, self.longest_ticks)
             self._came = back
         return super().commit(window, failure)
 
-    def _restart_ticks(self) -> int:
+    def _restart_length_ticks(self) -> int:
         return max(1, min(self.longest_ticks // _RESTART, self._horizon))
 
 
 def _copy_state(state: Mapping[str, Any]) -> dict[str, Any]:
-    """Copy what a block might change in place; messages and tables are never changed so."""
+    """Return an object's attributes, with copies of values a block might change in place."""
     return {
         name: value.copy() if _copied[value.__class__] else value for name, value in state.items()
     }

@@ -16,7 +16,7 @@ from dsa_des.scene.queue_policy import find_policy
 
 
 class BlockOptions(Parameters):
-    """Keys of a block's table that belong to the engine."""
+    """Keys of a block's table for the engine: latency, processor, platform, acknowledged notes."""
 
     may_change: ClassVar[tuple[str, ...]] = ("latency_s",)
 
@@ -50,7 +50,7 @@ def split_options(
 
 
 class ProcessorParameters(Parameters):
-    """A table ``[processors.NAME]``."""
+    """Settings of a shared processor, from a table ``[processors.NAME]``."""
 
     may_change: ClassVar[tuple[str, ...]] = ("service_s", "service_spread_s")
 
@@ -85,7 +85,7 @@ class Block:
     options: BlockOptions = BlockOptions()
 
     def to_table(self) -> dict[str, Any]:
-        """Return its table with every parameter written out, as plain TOML values."""
+        """Return the block's table with every parameter written out, as plain TOML values."""
         return {
             "type": self.type_name,
             **self.options.model_dump(mode="json", exclude_none=True, exclude_defaults=True),

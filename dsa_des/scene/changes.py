@@ -18,7 +18,7 @@ from itertools import combinations
 from math import lcm
 from typing import Any
 
-from dsa_des.block.component import scene_number
+from dsa_des.block.component import to_scene_number
 from dsa_des.block.parameters import nested_models
 from dsa_des.block.registry import section_models
 from dsa_des.errors import SceneError, did_you_mean, shown_value
@@ -37,7 +37,7 @@ _KEYS = (*_INSTANTS, "set")
 
 @dataclass(frozen=True)
 class TimedChange:
-    """Values that some keys have from an instant on.
+    """Values that some keys of a scene take from an instant on, for good or for a time.
 
     Parameters
     ----------
@@ -74,16 +74,16 @@ class TimedChange:
 
     def to_table(self) -> dict[str, Any]:
         """Return the change as an entry of ``changes``."""
-        from_s = scene_number(self.from_s)
+        from_s = to_scene_number(self.from_s)
         when = {"at_s": from_s} if self.to_s is None else {
-            "from_s": from_s, "to_s": scene_number(self.to_s)
+            "from_s": from_s, "to_s": to_scene_number(self.to_s)
         }  # fmt: skip
         return {**when, "set": dict(self.resolved)}
 
 
 @dataclass(frozen=True)
 class Stretch:
-    """What a scene is from an instant on, and by which keys it differs from what it begins as."""
+    """The scene from an instant of change on, and the keys that then differ from its start."""
 
     from_s: Fraction
     scene: Any
@@ -93,7 +93,7 @@ class Stretch:
 def read_timed_changes(
     scene_file: SceneFile, blocks: Mapping[str, Any], wires: Sequence[Wire]
 ) -> list[TimedChange]:
-    """Return the changes of a scene; what is wrong with them is reported.
+    """Return the timed changes of a scene; what is wrong with them is added to its problems.
 
     `blocks` are the classes of the scene's blocks, None where one is not known; `wires` those read.
     """
@@ -107,7 +107,7 @@ def read_timed_changes(
         if (change := _read_entry(scene_file, number, entry, blocks, wires)) is not None
     ]
     for one, other in combinations(read, 2):
-        _refuse_overlap(scene_file, one, other)
+        _report_overlap(scene_file, one, other)
     return read
 
 
@@ -149,19 +149,21 @@ def _read_entry(
     keys = []
     for text, value in values.items():
         keys.append(key := parse_key_path(scene_file.data, text))
-        if reason := _explain_fixed(scene_file, key, blocks):
+        if reason := _explain_unchangeable_key(scene_file, key, blocks):
             scene_file.report((*at, "set", text), reason, value)
     if from_s is None or len(scene_file.problems) > before:
         return None
     resolved = {
-        _key_of_written_scene(scene_file, text, key, wires): value
+        _renumber_wire_key(scene_file, text, key, wires): value
         for (text, value), key in zip(values.items(), keys, strict=True)
     }
     return TimedChange(number, from_s, to_s, values, tuple(keys), resolved)
 
 
-def _key_of_written_scene(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wire]) -> str:
-    """Return what a dotted key is called where the scene's wires are written out, in order."""
+def _renumber_wire_key(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wire]) -> str:
+    """Return a dotted key with the number of a wire as written replaced by its number among the
+    scene's separate, sorted wires.
+    """
     if key[0] != "wires":
         return text
     entry = scene_file.data["wires"][key[1]]
@@ -188,21 +190,22 @@ def _read_instant_s(scene_file: SceneFile, key: Key, value: Any) -> Fraction | N
     return seconds
 
 
-def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> str:
-    """Return why a key cannot change while a run lasts, and which could; nothing where it can."""
+def _explain_unchangeable_key(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -> str:
+    """Return why a key cannot change during a run, with keys that can; empty if it can."""
     rest: list[str | int]
     first, name, *rest = (*key, "", "")
     if first == "blocks" and name in blocks:
         if (cls := blocks[name]) is None:
             return ""  # what is wrong with it is said already
         key = key[2:]
-        of_tables, inside = _allowed_inside(cls.Parameters, key)
-        allowed = may_change(BlockOptions) if len(inside) >= len(key) else ()
+        of_tables, inside = _changeable_keys_and_rest(cls.Parameters, key)
+        allowed = changeable_keys(BlockOptions) if len(inside) >= len(key) else ()
         if cls.remembers is not None or cls.heeds_changes:
             allowed, rest = allowed + of_tables, list(inside)
         elif inside[0] in of_tables:
             return (
-                f"cannot change while a run lasts: {cls.path()} does not say what it remembers "
+                f"cannot change while a run lasts: {cls.import_path()} does not say what it "
+                f"remembers "
                 "(Component.remembers)"
             )
         what = f"blocks.{name}, a {cls.__name__},"
@@ -211,9 +214,9 @@ def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -
     elif first == "wires":
         allowed, what, rest = OF_WIRES, f"wires[{name}]", rest[:-1]
     elif first == "processors" and name in scene_file.data.get("processors", {}):
-        allowed, what, rest = may_change(ProcessorParameters), f"processors.{name}", rest[:-1]
+        allowed, what, rest = changeable_keys(ProcessorParameters), f"processors.{name}", rest[:-1]
     elif first in section_models():
-        allowed, what, rest = may_change(section_models()[str(first)]), f"[{first}]", [name]
+        allowed, what, rest = changeable_keys(section_models()[str(first)]), f"[{first}]", [name]
     else:
         known = [*(f"blocks.{n}" for n in blocks), "wires", "processors", *section_models()]
         hint = did_you_mean(dotted_key(key[:2]), known)
@@ -226,22 +229,22 @@ def _explain_fixed(scene_file: SceneFile, key: Key, blocks: Mapping[str, Any]) -
     return f"cannot change while a run lasts; {what} can change others{hint}"
 
 
-def _allowed_inside(
+def _changeable_keys_and_rest(
     model: type[Any], key: Sequence[str | int]
 ) -> tuple[tuple[str, ...], Sequence[str | int]]:
-    """Return which keys may change of the table that a key is in, and the key from there on."""
+    """Return the keys that may change in the innermost table along `key`, and the rest of `key`."""
     models = [model]
     for place, part in enumerate(key):
-        if part in (allowed := may_change(*models)) or place == len(key) - 1:
+        if part in (allowed := changeable_keys(*models)) or place == len(key) - 1:
             return allowed, key[place:]
         fields = [one.model_fields[str(part)] for one in models if part in one.model_fields]
         # An item's number or name leads into no other table.
         models = [inner for of in fields for inner in nested_models(of.annotation)] or models
-    return may_change(model), ("",)
+    return changeable_keys(model), ("",)
 
 
-def may_change(*models: type[Any]) -> tuple[str, ...]:
-    """Return which keys of tables may change while a run lasts, as their classes declare."""
+def changeable_keys(*models: type[Any]) -> tuple[str, ...]:
+    """Return the keys of some tables that may change during a run, as their classes declare."""
     found = dict.fromkeys(
         name
         for model in models
@@ -251,8 +254,8 @@ def may_change(*models: type[Any]) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _refuse_overlap(scene_file: SceneFile, one: TimedChange, other: TimedChange) -> None:
-    """Report two changes that say of one key at one instant what it is."""
+def _report_overlap(scene_file: SceneFile, one: TimedChange, other: TimedChange) -> None:
+    """Report two changes that set the same key and are in force at the same time."""
     if other.from_s < one.from_s:
         one, other = other, one
     for text, key in zip(other.values, other.keys, strict=True):
@@ -280,7 +283,7 @@ def stretches_of(
     changes: list[TimedChange],
     check: Callable[[SceneFile], Any],
 ) -> list[Stretch]:
-    """Return what a scene is after each instant at which something changes, in order.
+    """Return the scene after each instant at which something changes, in order of time.
 
     `check` makes a scene of tables; what is wrong with one of them is reported at its change.
     """
@@ -321,7 +324,7 @@ def _check_late_changes(
     changes: list[TimedChange],
     notes: list[str],
 ) -> None:
-    """Report changes beyond the end of a run of the same file, and note those of a shorter one."""
+    """Report changes after the run's end; only note them if that was set outside their file."""
     if duration_s is None:
         return
     for change in changes:
@@ -338,14 +341,14 @@ def _check_late_changes(
 
 
 def _changes_in_force(changes: list[TimedChange], instant: Fraction) -> Iterator[TimedChange]:
-    """Yield the changes that hold at an instant: those for good in order of time, then others."""
+    """Yield the changes in force at an instant: the lasting ones by time, then the temporary."""
     for change in sorted(changes, key=lambda one: (one.to_s is not None, one.from_s)):
         if change.from_s <= instant and (change.to_s is None or instant < change.to_s):
             yield change
 
 
 def _share_equal_parts(scene: Any, others: list[Any]) -> Any:
-    """Return a scene that has in common with others what is equal in them."""
+    """Return the scene with blocks and sections equal to others' replaced by the same objects."""
     blocks = {
         name: next((o.blocks[name] for o in others if o.blocks.get(name) == block), block)
         for name, block in scene.blocks.items()

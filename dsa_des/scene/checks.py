@@ -26,7 +26,7 @@ from dsa_des.scene.keys import Key, dotted_key
 from dsa_des.scene.overrides import drop_parameters_of_other_type
 from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.scene.wiring import Wire, block_name_refusal
+from dsa_des.scene.wiring import Wire, explain_bad_block_name
 from dsa_des.stretches.outage import Outage
 from dsa_des.text.safe_text import shorten
 from dsa_des.time.clock import MAX_TICK, ClockSpec, common_ticks_per_second, parse_rational
@@ -39,16 +39,16 @@ if TYPE_CHECKING:
 _A_DAY = Fraction(86400)
 
 
-def check_lookalikes(scene: SceneFile, key: Key, given: Any, parsed: Any) -> None:
-    """Report values that pydantic quietly converted: ``true`` or ``"5"`` for 5, 1 for true."""
+def report_silent_conversions(scene: SceneFile, key: Key, given: Any, parsed: Any) -> None:
+    """Report truth values or text that pydantic took for numbers, or numbers for truth values."""
     if isinstance(given, Mapping):
         fields = vars(parsed) if isinstance(parsed, BaseModel) else parsed
         for name, value in given.items():
             if isinstance(fields, Mapping) and name in fields:
-                check_lookalikes(scene, (*key, name), value, fields[name])
+                report_silent_conversions(scene, (*key, name), value, fields[name])
     elif isinstance(given, list) and isinstance(parsed, list | tuple):
         for index, pair in enumerate(zip(given, parsed, strict=False)):
-            check_lookalikes(scene, (*key, index), *pair)
+            report_silent_conversions(scene, (*key, index), *pair)
     elif isinstance(parsed, bool) != isinstance(given, bool):
         if isinstance(parsed, bool | int | float):
             needed = "true or false" if isinstance(parsed, bool) else "a number"
@@ -61,7 +61,7 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, str) else value
 
 
-def check_times(
+def checked_ticks_per_s(
     scene: SceneFile,
     blocks: "Mapping[str, Block]",
     clocks: Mapping[str, ClockSpec | None],
@@ -69,7 +69,7 @@ def check_times(
     duration_s: Fraction | None,
     processors: "Mapping[str, ProcessorParameters] | None" = None,
 ) -> int:
-    """Return the ticks per second of a scene; times that 64-bit ticks cannot hold are problems."""
+    """Return the ticks per second that make all times whole; report times too long for 64 bits."""
     late = [wire for wire in wires if wire.total_delay_s or wire.jitter_s]
     times = [wire.total_delay_s for wire in late]
     known = {name: spec for name, spec in clocks.items() if spec is not None}
@@ -112,20 +112,21 @@ def check_times(
 
 
 def read_clocks(scene: SceneFile, blocks: "Mapping[str, Block]") -> dict[str, ClockSpec | None]:
-    """Return every block's scan clock, None of one without; none of a class that cannot say."""
+    """Return block → its scan clock or None; a class that fails to say is reported and left out."""
     clocks: dict[str, ClockSpec | None] = {}
     for name, block in blocks.items():
         try:
             with wrap_foreign_errors():
                 spec = block.cls.clock_of(block.parameters)
         except ForeignFailure as error:
-            message = f"{block.cls.path()} cannot say its clock (clock_of): {error}"
+            message = f"{block.cls.import_path()} cannot say its clock (clock_of): {error}"
             scene.report(("blocks", name), message)
             continue
         if spec is None or isinstance(spec, ClockSpec):
             clocks[name] = spec
         else:
-            message = f"{block.cls.path()} gives no clock: clock_of must return a ClockSpec or None"
+            of = block.cls.import_path()
+            message = f"{of} gives no clock: clock_of must return a ClockSpec or None"
             scene.report(("blocks", name), message)
     return clocks
 
@@ -148,18 +149,19 @@ def _check_clock(scene: SceneFile, key: Key, spec: ClockSpec, ticks_per_s: int) 
 
 
 def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]") -> None:
-    """Report effects that no hook calls, and those of one block that share a name."""
+    """Report effects that no hook of their block calls, and those of a block that share a name."""
     for name, block in blocks.items():
         cls, hooks = block.cls, block.cls.all_hooks()
         said = [
-            f"{cls.path()} has an effect {effect.name!r} that acts on {effect.acts_on!r}, which is "
+            f"{cls.import_path()} has an effect {effect.name!r} that acts on {effect.acts_on!r}, "
+            f"which is "
             f"no hook of the block{did_you_mean(effect.acts_on, hooks) or '; it has none'}"
             for effect in cls.effects
             if effect.acts_on not in hooks
         ]
         names = [effect.name for effect in cls.effects]
         said += [
-            f"{cls.path()} has two effects named {twice!r}: each needs a name of its own"
+            f"{cls.import_path()} has two effects named {twice!r}: each needs a name of its own"
             for twice in sorted({n for n in names if names.count(n) > 1})
         ]
         key = ("blocks", name, "type")
@@ -167,13 +169,13 @@ def check_effects(scene: SceneFile, blocks: "Mapping[str, Block]") -> None:
             scene.report(key, message, block.type_name)
 
 
-def check_activity(
+def check_blocks_can_run(
     scene: SceneFile,
     blocks: "Mapping[str, Block]",
     clocks: Mapping[str, ClockSpec | None],
     wires: Sequence[Wire],
 ) -> None:
-    """Report blocks that would never run, and wires that hold a message for a queued input."""
+    """Report blocks that would never run, and initial messages for inputs that cannot hold one."""
     woken = {
         wire.target
         for wire in wires
@@ -230,7 +232,7 @@ def read_seed(scene_file: SceneFile) -> int:
 
 
 def read_duration(scene_file: SceneFile) -> Fraction | None:
-    """Return the length of the run in s, or None where it is left to the sources."""
+    """Return the length of the run in s; None where the scene leaves it to its sources."""
     if "duration_s" not in scene_file.data:
         return None
     value = scene_file.data["duration_s"]
@@ -245,7 +247,7 @@ def read_duration(scene_file: SceneFile) -> Fraction | None:
 
 
 def read_sections(scene_file: SceneFile) -> dict[str, Parameters]:
-    """Return the tables that belong to no block, also those with their defaults only."""
+    """Return name → section for the tables of no block; those left out have their defaults."""
     read = {
         name: read_table(scene_file, (name,), model, scene_file.data.get(name, {}))
         for name, model in section_models().items()
@@ -256,7 +258,7 @@ def read_sections(scene_file: SceneFile) -> dict[str, Parameters]:
 def read_table(
     scene_file: SceneFile, key: Key, model: type[_Model], table: Any, what: str = ""
 ) -> _Model | None:
-    """Return a table as its model; where anything is wrong with it, report that, and None.
+    """Return a table as an instance of `model`; None, with a report, if anything is wrong.
 
     Messages call it `what`, by default by its key.
     """
@@ -270,12 +272,12 @@ def read_table(
             scene_file, key, what or f"[{dotted_key(key)}]", model, error
         )
         return None
-    check_lookalikes(scene_file, key, table, read)
+    report_silent_conversions(scene_file, key, table, read)
     return read
 
 
 def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any], dict[str, Block]]:
-    """Return the class of each block, None where it is not known, and the faultless blocks."""
+    """Return block → its class, None if unknown, and name → `Block` for the faultless blocks."""
     tables = scene_file.data.get("blocks", {})
     classes: dict[str, Any] = {}
     blocks: dict[str, Block] = {}
@@ -286,7 +288,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
         key: Key = ("blocks", name)
         table = tables[name]
         classes[name] = None
-        if reason := block_name_refusal(str(name)):
+        if reason := explain_bad_block_name(str(name)):
             scene_file.report(key, reason, str(name))
         if not isinstance(table, dict):
             scene_file.report(key, "must be a table", table)
@@ -317,7 +319,7 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
                     "or adds one"
                 )
         extra, given = split_options(table, cls.Parameters)
-        given = _restore_sources(scene_file, key, given, cls.Parameters)
+        given = _fill_from_first_file(scene_file, key, given, cls.Parameters)
         try:
             with wrap_foreign_errors(ValidationError):
                 parameters = cls.Parameters.model_validate(given)
@@ -329,19 +331,21 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
             )
             continue
         except ForeignFailure as error:
-            message = f"{cls.path()} cannot take its parameters: {error}"
+            message = f"{cls.import_path()} cannot take its parameters: {error}"
             scene_file.report(key, message)
             continue
-        check_lookalikes(scene_file, key, given, parameters)
-        check_lookalikes(scene_file, key, extra, options)
+        report_silent_conversions(scene_file, key, given, parameters)
+        report_silent_conversions(scene_file, key, extra, options)
         blocks[name] = Block(name, str(absolute_type_name(type_name)), cls, parameters, options)
     return classes, blocks
 
 
-def _restore_sources(
+def _fill_from_first_file(
     scene_file: SceneFile, key: Key, given: dict[str, Any], model: Any
 ) -> dict[str, Any]:
-    """Return a block's parameters with what its tables take from the file that wrote them first."""
+    """Return a block's parameters in which inner tables get missing keys from the values that stood
+    beside them in the file that first wrote them.
+    """
     for (name, inner), outer in getattr(model, "as_written_with", {}).items():
         table, beside = given.get(name), scene_file.beside.get((*key, name))
         if isinstance(table, dict) and beside is not None and inner not in table:
@@ -353,7 +357,7 @@ def _restore_sources(
 def read_processors(
     scene_file: SceneFile, blocks: Mapping[str, Block]
 ) -> dict[str, ProcessorParameters]:
-    """Return the shared processors; blocks must name none besides."""
+    """Return name → shared processor; blocks that name a processor the scene lacks are reported."""
     tables = scene_file.data.get("processors", {})
     if not isinstance(tables, dict):
         scene_file.report(("processors",), "must hold one table per processor")
@@ -376,7 +380,7 @@ _MOST_OUTAGES = 100_000
 
 
 def read_outages(scene_file: SceneFile, blocks: Mapping[str, Any], duration_s: Any) -> list[Outage]:
-    """Return the outages of a scene; what is wrong with them is reported."""
+    """Return the outages of a scene; what is wrong with them is added to its problems."""
     entries = scene_file.data.get("outages", [])
     if not isinstance(entries, list):
         scene_file.report(("outages",), "must be a list of tables: [[outages]]", entries)

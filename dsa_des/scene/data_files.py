@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import load_installed
+from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.files.input_files import InputFileError, is_regular_file, read_input_text
 from dsa_des.files.toml_files import NotToml, TomlError, parse_toml
 
@@ -20,14 +20,14 @@ _LARGEST_SCENE_BYTES = 1024 * 1024
 
 
 class DataScene(NamedTuple):
-    """A scene that is made of a file: its tables, and what is in the file, for people."""
+    """A scene made from a data file: its tables, and lines that describe the file to people."""
 
     tables: Mapping[str, Any]
     about: list[str]
 
 
 def scene_of_data(path: Path) -> DataScene | None:
-    """Return the scene that is made of a file; None where it is a scene itself, or nothing."""
+    """Return the scene an installed reader makes of a data file; None for TOML or unknown files."""
     if not is_regular_file(path) or path.suffix.lower() == ".toml":
         return None
     try:
@@ -40,7 +40,7 @@ def scene_of_data(path: Path) -> DataScene | None:
     except InputFileError:
         pass
     for point in entry_points_of(GROUP).values():
-        found: DataScene | None = load_installed(point)(path)
+        found: DataScene | None = load_unnamed_entry_point(point)(path)
         if found is not None:
             return found
     return None

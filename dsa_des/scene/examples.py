@@ -15,7 +15,7 @@ Kind = Literal["scene", "study", "case"]
 
 
 def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
-    """Return the file of a scene, study or case: a path that exists, or else a shipped one's.
+    """Return an input file's path: as given if it exists, else the shipped file of that name.
 
     A name that is neither is returned as a path, for its reader to say what is wrong with it.
     """
@@ -29,7 +29,7 @@ def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
     if shipped is not None:
         return shipped
     # A name that no file system takes is refused where it is opened.
-    if not path.is_absolute() and len(path.name) <= 255 and not _has_neighbour(path):
+    if not path.is_absolute() and len(path.name) <= 255 and not _has_similar_file(path):
         names = [example.name for example in examples() if kind in (None, example.kind)]
         close = nearest_name(path.name.removesuffix(".toml"), names)
         if close or (len(path.parts) == 1 and not path.suffix):
@@ -43,8 +43,8 @@ def find_input_file(asked: Path | str, kind: Kind | None = None) -> Path:
     return path
 
 
-def _has_neighbour(path: Path) -> bool:
-    """Return whether a file (no folder) of nearly this name lies in its folder."""
+def _has_similar_file(path: Path) -> bool:
+    """Return whether the folder of `path` holds a file with nearly the same name."""
     try:
         files = [entry.name for entry in os.scandir(path.parent) if entry.is_file()]
         return nearest_name(path.name, files) is not None
@@ -113,7 +113,7 @@ def find_example(name: str, kind: Kind | None = None) -> Path | None:
 
 @cache
 def _kind_and_title(path: Path) -> tuple[Kind, str] | None:
-    """Return what a file is, and its title; None for a part of a scene."""
+    """Return whether a file is scene, study or case, and its title; None for part of a scene."""
     try:
         data = read_scene_file(path).data
     except SceneError:
@@ -123,11 +123,11 @@ def _kind_and_title(path: Path) -> tuple[Kind, str] | None:
         return "study", title
     if "study" in data and "requirements" in data:
         return "case", title
-    return ("scene", title) if _is_whole(data) else None
+    return ("scene", title) if _is_complete_scene(data) else None
 
 
-def _is_whole(data: dict[str, Any]) -> bool:
-    """Return whether tables are a scene and not a part of one: its wires end at its blocks."""
+def _is_complete_scene(data: dict[str, Any]) -> bool:
+    """Return whether tables are a complete scene: all wires begin and end at its blocks."""
     blocks, wires = data.get("blocks"), data.get("wires")
     if not isinstance(blocks, dict) or not isinstance(wires, list):
         return False

@@ -16,7 +16,7 @@ from dsa_des.scene.wiring import Wire
 
 
 def build_graph(blocks: Sequence[str], wires: Sequence[Wire]) -> nx.DiGraph:
-    """Return the graph of the blocks; an edge holds its wires as ``wires``.
+    """Return the directed graph of the blocks, in which each edge lists its wires as ``wires``.
 
     An edge is ``is_delayed`` when all of its wires are.
     """
@@ -32,7 +32,7 @@ def build_graph(blocks: Sequence[str], wires: Sequence[Wire]) -> nx.DiGraph:
 
 
 def undelayed_edges(graph: nx.DiGraph) -> nx.DiGraph:
-    """Return the view of the graph over the edges that act within an instant."""
+    """Return a view of the graph with only those edges that act within an instant."""
     return nx.subgraph_view(graph, filter_edge=lambda a, b: not graph.edges[a, b]["delayed"])
 
 
@@ -42,7 +42,7 @@ def check_graph(
     classes: Mapping[str, type[Component]],
     unsure: Set[str] = frozenset(),
 ) -> None:
-    """Report everything that is wrong with the wiring.
+    """Report all faults of the wiring as problems of the scene.
 
     Required inputs without a wire, blocks that no source reaches, cycles without a delay (each
     hop listed), and feedback wires that do not say what they hold before the first message.
@@ -87,7 +87,7 @@ def _check_cycles(scene: SceneFile, graph: nx.DiGraph) -> None:
             '(delay_s, or delay = "1 scan")'
         )
         scene.report(("wires",), message)
-    looped = cycle_numbers(graph)
+    looped = loop_number_by_block(graph)
     for source, target, wires in graph.edges(data="wires"):
         if source in looped and target in looped and looped[source] == looped[target]:
             for wire in wires:
@@ -105,7 +105,7 @@ def _check_reach(
     classes: Mapping[str, type[Component]],
     unfed: Set[str],
 ) -> None:
-    """Report blocks that no source reaches, but for those `unfed` and what is behind them."""
+    """Report blocks that no source reaches, except those in `unfed` or downstream of them."""
     sources = [
         name for name in graph if not any(port.required for port in classes[name].inputs.values())
     ]
@@ -125,8 +125,8 @@ def _check_reach(
                 scene.report(("blocks", name), message)
 
 
-def cycle_numbers(graph: nx.DiGraph) -> dict[str, int]:
-    """Return, for each block in a feedback loop, the number of its loop."""
+def loop_number_by_block(graph: nx.DiGraph) -> dict[str, int]:
+    """Return block → the number of its feedback loop, for the blocks that are in one."""
     looped: dict[str, int] = {}
     for number, group in enumerate(nx.strongly_connected_components(graph)):
         first = next(iter(group))
@@ -160,12 +160,12 @@ def window_order(
     queues: Mapping[str, Collection[str]] | None = None,
     first: Collection[str] = (),
 ) -> dict[str, int]:
-    """Return the depth of windowed blocks over all their edges, delayed ones included.
+    """Return windowed block → depth: longest path to it among them, over delayed edges too.
 
     A window is handled block by block, so a sender must be done with it before its receiver
     starts, whatever the delay between them; over the edges in `cut` it need not be. A queue (name
     to the blocks that line up in it) comes after all of its blocks and before their receivers; its
-    depth stands under `queue_key`. Whatever the blocks in `first` do not depend on is deeper.
+    depth stands under `queue_node_name`. Whatever the blocks in `first` do not depend on is deeper.
     """
     part = nx.DiGraph(graph.subgraph(windowed))
     part.remove_edges_from(cut)
@@ -173,17 +173,17 @@ def window_order(
     return _depths(part, first)
 
 
-def queue_key(name: str) -> str:
-    """Return the node of a shared processor in the graph; names of blocks hold no colon."""
+def queue_node_name(name: str) -> str:
+    """Return the node name of a shared processor's queue; its colon sets it apart from blocks."""
     return f"processor: {name}"
 
 
 def add_queue_nodes(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.DiGraph:
-    """Return the graph in which what blocks send goes through the queue that they line up in."""
+    """Return a graph with shared processors' queues between their blocks and the receivers."""
     wired = nx.DiGraph()
     wired.add_nodes_from(graph)
-    wired.add_nodes_from(queue_key(name) for name in queues)
-    queue_of = {block: queue_key(name) for name, blocks in queues.items() for block in blocks}
+    wired.add_nodes_from(queue_node_name(name) for name in queues)
+    queue_of = {block: queue_node_name(name) for name, blocks in queues.items() for block in blocks}
     for source, target in graph.edges:
         wired.add_edge(queue_of.get(source, source), target)
     wired.add_edges_from((block, queue) for block, queue in queue_of.items() if block in graph)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.registry import add_source
+from dsa_des.block.registry import with_source_folder
 from dsa_des.errors import Problem, did_you_mean
 from dsa_des.scene.keys import (
     Key,
@@ -18,7 +18,7 @@ from dsa_des.scene.keys import (
     explain_no_item,
     is_new_item,
     item_index,
-    names_of,
+    item_names,
     step_into_key,
     unquote_key,
 )
@@ -28,7 +28,7 @@ REMOVE, BLOCKS, WIRES = "remove", "blocks", "wires"
 
 @dataclass(eq=False)
 class Removal:
-    """One key that a table removes from what it inherits."""
+    """One key that a table removes from what it inherits, and whether it was there."""
 
     #: Dotted, from the table that says it.
     text: str
@@ -44,7 +44,7 @@ class Removals(list[Removal]):
 
 
 class Inheritance:
-    """Puts tables over each other."""
+    """Merges tables over those that they inherit from, and removes what ``remove`` names."""
 
     def __init__(self, sources: dict[Key, str], problems: list[Problem]) -> None:
         self.of_other_type: dict[Key, str] = {}
@@ -54,15 +54,15 @@ class Inheritance:
         self._problems = problems
         self._any_removals = False
 
-    def removals(self, names: Any, source: str) -> Any:
-        """Return what stands for the value of ``remove``; what is no list of texts is itself."""
+    def parse_removals(self, names: Any, source: str) -> Any:
+        """Return the `Removals` for ``remove``; what is not a list of texts stays unchanged."""
         if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
             return names
         self._any_removals = True
         return Removals(Removal(str(name), source) for name in names)
 
     def merge(self, base: dict[str, Any], over: Mapping[str, Any], at: Key) -> dict[str, Any]:
-        """Put the keys of `over` into `base`, table by table, and return `base`."""
+        """Merge `over` into `base` in place, table by table, and return `base`."""
         removals = over.get(REMOVE)
         blocks = set(base[BLOCKS]) if not at and isinstance(base.get(BLOCKS), dict) else set()
         if isinstance(removals, Removals):
@@ -70,17 +70,17 @@ class Inheritance:
                 self._remove(base, removal, at)
             base[REMOVE] = Removals([*base.get(REMOVE, ()), *removals])
         if len(at) == 2 and at[0] == "blocks":
-            self._remember_type(base, over, at)
+            self._note_keys_of_other_type(base, over, at)
         for key, value in over.items():
             mine = base.get(key)
             if isinstance(value, Removals):
                 continue
             if isinstance(value, dict) and isinstance(mine, dict):
                 self.merge(mine, value, (*at, key))
-            elif isinstance(value, dict) and isinstance(mine, list) and names_of(mine):
+            elif isinstance(value, dict) and isinstance(mine, list) and item_names(mine):
                 self._merge_items(mine, value, (*at, key))
             else:
-                lost = _lost_items(mine, value)
+                lost = _names_of_lost_items(mine, value)
                 if lost:
                     self.replaced[(*at, key)] = lost
                 base[key] = value
@@ -89,7 +89,7 @@ class Inheritance:
         return base
 
     def _leave_out_wires(self, base: dict[str, Any], gone: set[str]) -> None:
-        """Leave out the inherited wires from and to blocks that were removed."""
+        """Remove the inherited wires from and to blocks that were removed."""
         if not isinstance(base.get(WIRES), list):
             return
         kept = [
@@ -105,8 +105,10 @@ class Inheritance:
             self._sources |= {(WIRES, new, *key[2:]): file for key, file in inside.items()}
         base[WIRES] = [piece for _, piece in kept]
 
-    def note_beside(self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key) -> None:
-        """Note the keys beside each table of a block in the file that writes it first."""
+    def note_values_beside(
+        self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key
+    ) -> None:
+        """Record the values beside each table in a block, in the file that first writes it."""
         for key, value in own.items():
             inherited = merged.get(key)
             if not (isinstance(value, dict) and isinstance(inherited, dict)):
@@ -115,15 +117,17 @@ class Inheritance:
                 values = {k: v for k, v in merged.items() if not isinstance(v, dict | list)}
                 self.beside.setdefault((*at, key), values)
             elif len(at) < 2 and (at or key == "blocks"):
-                self.note_beside(value, inherited, (*at, key))
+                self.note_values_beside(value, inherited, (*at, key))
 
-    def finish(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
-        """Return the tables of a file that is read to its end, without what was to be removed."""
+    def finish_removals(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
+        """Strip ``remove``'s placeholders, report useless ones, and return a file's tables."""
         if self._any_removals:
-            self._strip(tables, at)
+            self._strip_removal_placeholders(tables, at)
         return tables
 
-    def _remember_type(self, base: dict[str, Any], over: Mapping[str, Any], at: Key) -> None:
+    def _note_keys_of_other_type(
+        self, base: dict[str, Any], over: Mapping[str, Any], at: Key
+    ) -> None:
         old = base.get("type")
         if isinstance(old, str) and "type" in over and over["type"] != old:
             for key in base:
@@ -131,7 +135,7 @@ class Inheritance:
                     self.of_other_type.setdefault((*at, key), str(old))
 
     def _merge_items(self, items: list[Any], over: Mapping[str, Any], at: Key) -> None:
-        """Change items of a list by their names."""
+        """Merge changes, keyed by item name or number, into the items of a list."""
         removals = over.get(REMOVE)
         if isinstance(removals, Removals):
             for removal in removals:
@@ -154,7 +158,7 @@ class Inheritance:
             else:
                 items[index] = value
         if isinstance(removals, Removals):
-            self._report(removals, at)
+            self._report_unmatched_removals(removals, at)
 
     def _remove(self, container: Any, removal: Removal, at: Key) -> None:
         rest = unquote_key(removal.text)
@@ -167,12 +171,12 @@ class Inheritance:
             if not rest:
                 del container[index]
                 removal.found = True
-                self._forget(container, (*at, index))
+                self._forget_source(container, (*at, index))
                 return
             container, at = container[index], (*at, index)
 
-    def _forget(self, container: Any, key: Key) -> None:
-        """Forget where a key was written; later items of a list move up."""
+    def _forget_source(self, container: Any, key: Key) -> None:
+        """Forget which file wrote a removed key, and renumber later items' keys in its list."""
         self.beside.pop(key, None)
         for known in [known for known in self._sources if known[: len(key)] == key]:
             del self._sources[known]
@@ -185,18 +189,18 @@ class Inheritance:
         for known in [known for known in self._sources if known[: len(old)] == old]:
             self._sources[(*new, *known[len(old) :])] = self._sources.pop(known)
 
-    def _strip(self, value: Any, at: Key) -> None:
+    def _strip_removal_placeholders(self, value: Any, at: Key) -> None:
         if isinstance(value, list):
             for number, item in enumerate(value):
-                self._strip(item, (*at, number))
+                self._strip_removal_placeholders(item, (*at, number))
         if not isinstance(value, dict):
             return
         if isinstance(value.get(REMOVE), Removals):
-            self._report(value.pop(REMOVE), at)
+            self._report_unmatched_removals(value.pop(REMOVE), at)
         for key, item in value.items():
-            self._strip(item, (*at, key))
+            self._strip_removal_placeholders(item, (*at, key))
 
-    def _report(self, removals: Removals, at: Key) -> None:
+    def _report_unmatched_removals(self, removals: Removals, at: Key) -> None:
         for removal in removals:
             if not removal.found:
                 message = (
@@ -207,7 +211,7 @@ class Inheritance:
 
 
 def _drop_hops(entry: Any, gone: set[str]) -> list[Any]:
-    """Return what is left of an entry of ``wires`` without the hops from and to some blocks."""
+    """Return what remains of an entry of ``wires`` without hops from and to blocks in `gone`."""
     if isinstance(entry, dict):
         ends = [str(entry.get(end)).partition(".")[0].strip() for end in ("from", "to")]
         return [] if gone & set(ends) else [entry]
@@ -220,13 +224,13 @@ def _drop_hops(entry: Any, gone: set[str]) -> list[Any]:
         else:
             pieces[-1].append(end)
     return [entry] if len(pieces) == 1 else [
-        add_source("->".join(piece).strip(), getattr(entry, "folder", Path()))
+        with_source_folder("->".join(piece).strip(), getattr(entry, "folder", Path()))
         for piece in pieces if len(piece) > 1
     ]  # fmt: skip
 
 
-def _lost_items(old: Any, new: Any) -> list[str]:
-    """Return the named items of a list that another in its place has not."""
+def _names_of_lost_items(old: Any, new: Any) -> list[str]:
+    """Return the names of items in the old list that the new list in its place lacks."""
     if not (isinstance(old, list) and isinstance(new, list)):
         return []
-    return [name for name in names_of(old) if name not in names_of(new)]
+    return [name for name in item_names(old) if name not in item_names(new)]

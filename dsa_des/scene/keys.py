@@ -44,7 +44,7 @@ def flatten_tables(
 
 
 def step_into_key(container: Any, rest: str) -> tuple[str | int | None, str, str]:
-    """Return the next step into a table or list, as it was written, and what is left of the key.
+    """Return (key or index of the next step, the step as written, rest of the dotted key).
 
     A name that is already there is found whole, dots and brackets included: a study has axes of
     names such as ``wires[4].drop_probability``. The step into a list is None where it has no such
@@ -59,7 +59,7 @@ def step_into_key(container: Any, rest: str) -> tuple[str | int | None, str, str
 
 def _step_into_list(items: list[Any], rest: str) -> tuple[int | None, str, str]:
     bracket = rest.startswith("[")
-    names = names_of(items)
+    names = item_names(items)
     inside = rest[1:] if bracket else rest
     part = _longest_match([f"{name}]" for name in names] if bracket else names, inside)
     if part is None:
@@ -72,7 +72,7 @@ def _step_into_list(items: list[Any], rest: str) -> tuple[int | None, str, str]:
 
 
 def item_index(items: list[Any], part: str) -> int | None:
-    """Return which item a number or a name means; None where none does, or several do."""
+    """Return the index of the item that a number or name means; None if none or several match."""
     if INDEX.fullmatch(part):
         return int(part) if int(part) < len(items) else None
     places = [number for number, item in enumerate(items) if _item_name(item) == part]
@@ -80,8 +80,8 @@ def item_index(items: list[Any], part: str) -> int | None:
 
 
 def explain_no_item(items: list[Any], part: str) -> str:
-    """Say that a list has no such item, or several, and what it has."""
-    names = names_of(items)
+    """Return a message that a list has no such item, or several, and which items it has."""
+    names = item_names(items)
     if names.count(part) > 1:
         return f"{names.count(part)} items of the list are called {part!r}: give a number, from 0"
     message = f"there is no item {part!r}: the list has {len(items)} (from 0)"
@@ -91,25 +91,25 @@ def explain_no_item(items: list[Any], part: str) -> str:
 
 
 def is_new_item(items: list[Any], name: str, value: Any) -> bool:
-    """Return whether a table of a name that a list lacks adds an item, and is no slip of the pen.
+    """Return whether a table under an unknown name is a new list item, not a misspelt old one.
 
     One of nearly a known name that lacks what all items have is meant to change that one.
     """
-    if not isinstance(value, dict) or INDEX.fullmatch(name) or names_of(items).count(name):
+    if not isinstance(value, dict) or INDEX.fullmatch(name) or item_names(items).count(name):
         return False
     if not all(isinstance(item, dict) for item in items):
         return False
     common = set.intersection(*map(set, items)) if items else set()
-    return nearest_name(name, names_of(items)) is None or common <= {"name", *value}
+    return nearest_name(name, item_names(items)) is None or common <= {"name", *value}
 
 
-def names_of(items: list[Any]) -> list[str]:
+def item_names(items: list[Any]) -> list[str]:
     """Return the names of the tables of a list that have one."""
     return [name for item in items if (name := _item_name(item))]
 
 
-def name_items(tables: Any, text: str) -> str:
-    """Return a dotted key with items of lists by their names; empty where it holds no item.
+def readable_key(tables: Any, text: str) -> str:
+    """Return a dotted key with list items by name, for messages; empty if it has no list item.
 
     ``wires[4].delay_s`` is ``wire from radar to fusion:.delay_s``.
     """
@@ -137,7 +137,7 @@ def name_items(tables: Any, text: str) -> str:
 
 
 def _blocks_of_wire(item: Any) -> list[str]:
-    """Return the blocks that a wire connects; none of what is no wire."""
+    """Return the names of the blocks that an entry of ``wires`` connects; none if no wire."""
     if isinstance(item, str) and "->" in item:
         ends = item.split("->")
     elif isinstance(item, dict) and {"from", "to"} <= set(item):
@@ -158,7 +158,7 @@ def _longest_match(names: list[str], rest: str) -> str | None:
 
 
 def parse_key_path(tables: Any, text: str) -> Key:
-    """Return the key path that a dotted key means in some tables, items by their number.
+    """Return the path of keys and item numbers that a dotted key means in the given tables.
 
     What the tables do not hold stays as it was written.
     """

@@ -12,9 +12,15 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.component import Component, SourcedText, scene_number
+from dsa_des.block.component import Component, SourcedText, to_scene_number
 from dsa_des.block.entry_points import COMPONENTS
-from dsa_des.block.registry import NotImported, UnknownType, add_source, find_component, type_text
+from dsa_des.block.registry import (
+    NotImported,
+    UnknownType,
+    class_name_in_scene,
+    find_component,
+    with_source_folder,
+)
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.files.toml_files import DEEPEST, NotToml, TomlError, parse_toml
 from dsa_des.scene.block_table import BlockOptions
@@ -36,7 +42,7 @@ IN_SET, IN_SWAP = "scene.set", "scene.swap"
 
 
 def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
-    """Split ``key=value``; a Problem when there is no ``=`` or an empty side."""
+    """Return (key, value) of a text ``key=value``; a Problem if ``=`` or either side is missing."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip() or not value.strip():
         form = "BLOCK=TYPE" if option == "--swap" else "KEY=VALUE"
@@ -49,13 +55,13 @@ def parse_value(text: str) -> Any:
     try:
         value = parse_toml(f"value = {text}")
     except NotToml:
-        return _add_sources(text)
+        return _add_working_directory(text)
     # What follows a line's end would be further keys.
-    return _add_sources(value["value"] if set(value) == {"value"} else text)
+    return _add_working_directory(value["value"] if set(value) == {"value"} else text)
 
 
 def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
-    """Return the keys and values of all ``--set``, and what is wrong with how they are written."""
+    """Return (key, value) of every ``--set``, and a problem for each malformed or repeated one."""
     values: dict[str, Any] = {}
     problems: list[Problem] = []
     for assignment in assignments:
@@ -78,7 +84,9 @@ def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[P
 def read_changes(
     sets: Iterable[str], swaps: Iterable[str], seed: int | None, duration_s: object
 ) -> tuple[list[Change], list[Problem]]:
-    """Return what ``--swap``, ``--set``, ``--seed`` and ``--duration`` change, in this order."""
+    """Return the changes that ``--swap``, ``--set``, ``--seed`` and ``--duration`` make, in this
+    order, and what is wrong with them.
+    """
     changes: list[Change] = []
     problems: list[Problem] = []
     for swap in swaps:
@@ -86,7 +94,7 @@ def read_changes(
         if isinstance(parsed, Problem):
             problems.append(parsed)
         else:
-            changes.append((SWAP + parsed[0], add_source(parsed[1], Path.cwd())))
+            changes.append((SWAP + parsed[0], with_source_folder(parsed[1], Path.cwd())))
     values, wrong = read_sets(sets)
     for key, value in values:
         if key.startswith(SWAP):
@@ -99,7 +107,7 @@ def read_changes(
 
 
 def read_python_changes(values: Mapping[Any, Any], source: str) -> list[Change]:
-    """Return what a program changes by `IN_SET` or `IN_SWAP`; SceneError with all that is wrong."""
+    """Return a program's changes by `Scene.set` or `Scene.swap`; SceneError with all problems."""
     changes: list[Change] = []
     problems: list[Problem] = []
     for key, value in values.items():
@@ -113,7 +121,7 @@ def read_python_changes(values: Mapping[Any, Any], source: str) -> list[Change]:
         else:
             try:
                 name = key if source == IN_SET else SWAP + key
-                changes.append((name, scene_value(value)))
+                changes.append((name, to_scene_value(value)))
             except TypeError as error:
                 problems.append(Problem(source, key, str(error)))
     if problems:
@@ -128,7 +136,7 @@ def apply_changes(
     swap_source: str = COMMAND_LINE,
     option: str = "--swap",
 ) -> list[str]:
-    """Make changes of a scene's tables; return which parameters swaps dropped.
+    """Apply changes to a scene's tables in place; return the keys of parameters swaps dropped.
 
     Messages say that values are from `source` and types from `swap_source`, there named `option`.
     """
@@ -143,7 +151,7 @@ def apply_changes(
 
 
 def apply_sets(study: SceneFile, assignments: Iterable[str]) -> None:
-    """Apply all ``--set`` to a study's tables; blocks are its scene's, below ``set``."""
+    """Apply all ``--set`` to a study's tables in place; refuse keys of blocks (below ``set``)."""
     values, problems = read_sets(assignments)
     study.problems += problems
     for text, value in values:
@@ -155,13 +163,13 @@ def apply_sets(study: SceneFile, assignments: Iterable[str]) -> None:
 
 
 def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Problem]:
-    """Put a value at a dotted key of the scene's tables and return what is wrong with that.
+    """Set the value at a dotted key of the scene's tables, and return the problems, if any.
 
     Items of lists go by number or name: ``blocks.traffic.intruders[0].east_m``, or
     ``blocks.traffic.intruders.head_on.east_m``.
     """
     try:
-        value = _extend_table(value, source)
+        value = _resolve_extends(value, source)
     except SceneError as error:
         return [replace(one, key=f"{text}.{one.key}") for one in error.problems]
     container: Any = scene.data
@@ -199,23 +207,23 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
     return []
 
 
-def _extend_table(value: Any, source: str) -> Any:
-    """Return a table with all that it extends, as a file's would be; all else as it is."""
+def _resolve_extends(value: Any, source: str) -> Any:
+    """Return a value in which tables with ``extends`` are merged with what they extend."""
     if isinstance(value, list):
-        return [_extend_table(item, source) for item in value]
+        return [_resolve_extends(item, source) for item in value]
     if not isinstance(value, dict):
         return value
     if "extends" in value:
         return read_scene_tables(value, source).data
-    return {key: _extend_table(item, source) for key, item in value.items()}
+    return {key: _resolve_extends(item, source) for key, item in value.items()}
 
 
 def swap_type(
     scene: SceneFile, name: str, type_name: str, source: str, option: str = "--swap"
 ) -> list[str]:
-    """Put another type into a block; return the keys that it had and the type lacks."""
+    """Change a block's type in the tables; return the keys dropped as the new type lacks them."""
     if not isinstance(type_name, SourcedText):
-        type_name = add_source(type_name, Path.cwd())
+        type_name = with_source_folder(type_name, Path.cwd())
     blocks = scene.data.get("blocks", {})
     if not isinstance(blocks, dict) or not isinstance(blocks.get(name), dict):
         hint = did_you_mean(name, blocks if isinstance(blocks, dict) else ())
@@ -242,7 +250,7 @@ def swap_type(
 
 
 def drop_parameters_of_other_type(scene: SceneFile, name: str, cls: type[Component]) -> list[str]:
-    """Drop what a block inherited from a table of another type and its own type `cls` lacks.
+    """Drop parameters inherited from a table of another type that the own type `cls` lacks.
 
     Return a note on each parameter that was dropped, or is kept and means another thing.
     """
@@ -270,7 +278,7 @@ def drop_parameters_of_other_type(scene: SceneFile, name: str, cls: type[Compone
 def _differing_descriptions(
     scene: SceneFile, old: str, cls: type[Component], parameter: str
 ) -> tuple[str, str] | None:
-    """Return how two types describe a parameter of one name, where that begins differently."""
+    """Return two types' descriptions of a parameter if they begin differently; else None."""
     if ":" in old:  # nothing foreign is imported for a note
         return None
     try:
@@ -293,13 +301,13 @@ def _type_key(name: str) -> Key:
 
 
 def _wire_table(entry: Any) -> dict[str, str] | None:
-    """Return the table of a wire written as ``"a -> b"``, so that its options can be set."""
+    """Return a wire written as ``a -> b`` as a table, for its options; None for anything else."""
     ends = [end.strip() for end in entry.split("->")] if isinstance(entry, str) else []
     return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else None
 
 
-def scene_value(value: Any, group: str = COMPONENTS) -> Any:
-    """Return a value of Python as a scene file in the working directory would hold it.
+def to_scene_value(value: Any, group: str = COMPONENTS) -> Any:
+    """Return a Python value in the form that a scene file in the working directory would hold.
 
     NumPy's numbers and arrays are among them, and classes by their names, in the entry points of
     `group` where they are registered. Anything else is a TypeError.
@@ -307,33 +315,33 @@ def scene_value(value: Any, group: str = COMPONENTS) -> Any:
     if isinstance(value, bool | int | float):
         return value
     if isinstance(value, type):
-        return type_text(value, group)
+        return class_name_in_scene(value, group)
     if isinstance(value, Path):
-        return add_source(str(value), Path.cwd())
+        return with_source_folder(str(value), Path.cwd())
     if isinstance(value, str):
-        return value if hasattr(value, "folder") else add_source(value, Path.cwd())
+        return value if hasattr(value, "folder") else with_source_folder(value, Path.cwd())
     if isinstance(value, Fraction):
-        return scene_number(value)
+        return to_scene_number(value)
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):
                 raise TypeError(f"has the key {key!r}: keys are texts")
-        return {str(key): scene_value(item, group) for key, item in value.items()}
+        return {str(key): to_scene_value(item, group) for key, item in value.items()}
     if isinstance(value, list | tuple | range):
-        return [scene_value(item, group) for item in value]
+        return [to_scene_value(item, group) for item in value]
     if hasattr(value, "tolist") and not isinstance(plain := value.tolist(), type(value)):
-        return scene_value(plain, group)
+        return to_scene_value(plain, group)
     raise TypeError(
         f"is of the type {type(value).__name__}: a scene holds texts, numbers, truth values, "
         "lists and tables"
     )
 
 
-def _add_sources(value: Any) -> Any:
+def _add_working_directory(value: Any) -> Any:
     if isinstance(value, str):
-        return add_source(value, Path.cwd())
+        return with_source_folder(value, Path.cwd())
     if isinstance(value, list):
-        return [_add_sources(item) for item in value]
+        return [_add_working_directory(item) for item in value]
     if isinstance(value, dict):
-        return {key: _add_sources(item) for key, item in value.items()}
+        return {key: _add_working_directory(item) for key, item in value.items()}
     return value

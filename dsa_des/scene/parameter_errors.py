@@ -11,14 +11,14 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 from pydantic_core import SchemaValidator
 
-from dsa_des.block.component import Parameters, scene_number
+from dsa_des.block.component import Parameters, to_scene_number
 from dsa_des.errors import Disagreements, Lines, Problem, did_you_mean, nearest_name
 from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.scene_file import SceneFile
 
 
-def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
-    """Return what every validator of a whole model says of a table that one of them refused."""
+def all_validator_messages(model: type[BaseModel], item: Any) -> list[str]:
+    """Return the messages of all of a model's validators on a table that one of them refused."""
     texts = _error_texts(item.get("ctx", {}).get("error")) or [item["msg"]]
     try:
         table = SchemaValidator(_fields_schema(model.__pydantic_core_schema__)).validate_python(
@@ -29,10 +29,10 @@ def all_disagreements(model: type[BaseModel], item: Any) -> list[str]:
     return list(dict.fromkeys(texts + _validator_messages(model, table)))
 
 
-def disagreements_besides(
+def other_validator_messages(
     model: type[BaseModel], given: Mapping[str, Any], refused: set[str]
 ) -> list[str]:
-    """Return what the other keys of a table disagree about where some are refused by themselves.
+    """Return a model's validators' messages on a table whose keys `refused` are known as wrong.
 
     Validators that look at one of the `refused` keys, missing or wrong, say nothing.
     """
@@ -51,7 +51,7 @@ def disagreements_besides(
 
 
 def _validator_messages(model: type[BaseModel], table: Any) -> list[str]:
-    """Return what the validators of a whole model say of it."""
+    """Return the error messages of the validators that check a model as a whole."""
     texts: list[str] = []
     names = set(model.model_fields)
     for validator in model.__pydantic_decorators__.model_validators.values():
@@ -84,7 +84,7 @@ def _fields_schema(schema: Any) -> Any:
 
 
 def _relax_fields(schema: Any, refused: set[str]) -> Any:
-    """Return a model's schema in which some fields may be anything."""
+    """Return a model's pydantic schema in which the fields `refused` may have any value."""
     if schema["type"] == "model-fields":
         anything = {"type": "model-field", "schema": {"type": "any"}}
         return {**schema, "fields": schema["fields"] | dict.fromkeys(refused, anything)}
@@ -102,7 +102,7 @@ def explain_validation_error(
     error: ValidationError,
     beside: Iterable[str] = (),
 ) -> list[Problem]:
-    """Return what is wrong with a table, one problem per key, with the nearest valid name.
+    """Return the problems pydantic found in a table, one per key, with the nearest valid name.
 
     It stands at `key` and describes `what`, for example a block type; keys `beside` those of the
     model may have been meant too.
@@ -120,7 +120,7 @@ def explain_validation_error(
             hint = f"; {instead}" if instead else did_you_mean(name, [close] if close else allowed)
             kind = "parameter" if key else "key"
             problems.append(scene_file.problem(at, f"unknown {kind} of {what}{hint}"))
-        elif length := _list_length(model, item):
+        elif length := _expected_list_length(model, item):
             given = _value_at(scene_file, at)
             problems.append(scene_file.problem(at, f"must be a list of {length} numbers", given))
         elif item["type"] == "too_short":
@@ -128,14 +128,14 @@ def explain_validation_error(
             if not isinstance(given, list) or len(given) < least:  # else its items were refused
                 problems.append(scene_file.problem(at, f"must be at least {least} values", given))
         elif item["type"].startswith("union_tag"):
-            problems.append(_kind_problem(scene_file, at, item["ctx"]))
+            problems.append(_discriminator_problem(scene_file, at, item["ctx"]))
         elif item["type"] == "missing":
             given = [str(k) for k in item["input"]] if isinstance(item["input"], dict) else []
             close = nearest_name(str(item["loc"][-1]), given)
             hint = f" ({close!r} is given)" if close else ""
             problems.append(scene_file.problem(at, f"is required by {what} and missing{hint}"))
         elif not item["loc"] and item["type"] == "value_error":
-            texts = all_disagreements(model, item)
+            texts = all_validator_messages(model, item)
             problems += [_refusal_problem(scene_file, at, text, item["input"]) for text in texts]
         elif isinstance(text := str(item.get("ctx", {}).get("error")), Lines):
             problems.append(_refusal_problem(scene_file, at, text, item["input"]))
@@ -158,13 +158,13 @@ def explain_validation_error(
             problems.append(_refusal_problem(scene_file, at, message, item["input"]))
     given = _value_at(scene_file, key)
     if refused and isinstance(given, Mapping):
-        for text in disagreements_besides(model, given, refused):
+        for text in other_validator_messages(model, given, refused):
             problems.append(_refusal_problem(scene_file, key, text, given))
     return _merge_by_key(problems)
 
 
 def _key_and_nearest_names(model: Any, item: Any) -> list[str]:
-    """Return the key that an error is about, and the nearest known ones of an unknown key."""
+    """Return the key that an error is about and, if that is unknown, the nearest known key."""
     if not item["loc"]:
         return []
     name = str(item["loc"][0])
@@ -175,7 +175,7 @@ def _key_and_nearest_names(model: Any, item: Any) -> list[str]:
 
 
 def _merge_by_key(problems: list[Problem]) -> list[Problem]:
-    """Return problems with one for each key: "must be true or false" "or 'auto'"."""
+    """Return the problems with those of one key that begin with ``must be`` joined by ``or``."""
     by_key: dict[tuple[str, str], Problem] = {}
     rest = []
     for problem in problems:
@@ -192,17 +192,19 @@ def _merge_by_key(problems: list[Problem]) -> list[Problem]:
 
 
 def _refusal_problem(scene_file: SceneFile, at: Key, message: str, value: Any) -> Problem:
-    """Return a validator's problem; that of a whole table is put at the key that it names."""
+    """Return the problem with a validator's message, on a whole table at the key its text names."""
     if not isinstance(value, Mapping):
-        return scene_file.problem(at, message, _show_value(value))
+        return scene_file.problem(at, message, _plain_value_for_message(value))
     about = re.fullmatch(r"(\w+) is (\S+): (.*)", message, re.DOTALL)
     if about and about[1] in value:
-        return scene_file.problem((*at, about[1]), about[3], _show_value(value[about[1]]))
+        return scene_file.problem(
+            (*at, about[1]), about[3], _plain_value_for_message(value[about[1]])
+        )
     return scene_file.problem(at, message)
 
 
-def _kind_problem(scene_file: SceneFile, at: Key, context: Any) -> Problem:
-    """Return what is wrong with the key that says which of several tables this is."""
+def _discriminator_problem(scene_file: SceneFile, at: Key, context: Any) -> Problem:
+    """Return the problem with the key that says which of several kinds of table this is."""
     at = (*at, context["discriminator"].strip("'"))
     if "tag" not in context:
         return scene_file.problem(at, "is required and missing")
@@ -212,8 +214,8 @@ def _kind_problem(scene_file: SceneFile, at: Key, context: Any) -> Problem:
     return scene_file.problem(at, f"must be one of {', '.join(allowed)}{hint}", context["tag"])
 
 
-def _list_length(model: Any, item: Any) -> int:
-    """Return how long a list should have been, if that is what is wrong; else 0."""
+def _expected_list_length(model: Any, item: Any) -> int:
+    """Return the length that a fixed-length list should have, if that is the error; else 0."""
     if item["type"] not in ("tuple_type", "missing", "too_long"):
         return 0
     *path, last = item["loc"]
@@ -237,17 +239,17 @@ def _value_at(scene_file: SceneFile, key: Key) -> Any:
     value: Any = scene_file.data
     for part in key:
         value = value[part]
-    return _show_value(value)
+    return _plain_value_for_message(value)
 
 
-def _show_value(value: Any) -> Any:
+def _plain_value_for_message(value: Any) -> Any:
     if isinstance(value, Fraction):
-        return scene_number(value)
+        return to_scene_number(value)
     return str(value) if isinstance(value, str) else value
 
 
 def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
-    """Return `key` + `loc` without the tags that pydantic puts into paths through unions."""
+    """Return the path `key` + `loc` without the tags that pydantic inserts for unions."""
     value = _value_at(scene_file, key)
     path: list[str | int] = list(key)
     for position, part in enumerate(loc):
@@ -263,7 +265,7 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
 
 
 def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
-    """Return the names allowed where `loc` points, following nested models as far as they go."""
+    """Return the field names allowed in the table of `loc`'s last part; empty if not a model."""
     names = [field.alias or name for name, field in model.model_fields.items()]
     for part in loc[:-1]:
         field = model.model_fields.get(part) if isinstance(part, str) else None
@@ -286,7 +288,7 @@ def _nested_model(annotation: Any) -> Any:
 
 
 def block_refusal(file: SceneFile, block: str, parameters: Parameters, text: str) -> Problem:
-    """Return what a block refuses at its start, at the key that its text begins with, if any.
+    """Return the problem with a block that refused to start, at the key or file that it names.
 
     Texts begin with keys, ``ownship: alt_m is 2e6: ...``, or with a file that a key names.
     """

@@ -7,7 +7,7 @@ from dsa_des.scene.scene import Scene
 
 
 def platform_by_block(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[str, str]:
-    """Return what carries each block, by name: what its table says, or what carries its feeders.
+    """Return block → its platform: the one its table names, or else that of its feeding blocks.
 
     `moved` is what some blocks move (`Component.platforms`); these are on none themselves. A block
     that nothing but they feed is on the first of it, if its table says nothing. What comes over
@@ -33,16 +33,16 @@ def platform_by_block(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[
         raise SceneError(problems)
     left = sorted(scene.blocks.keys() - moved.keys() - carrying.keys())
     while left:  # down the chains, around loops too
-        found = _carriers_by_feeders(left, near, carrying) or _carriers_by_feeders(
+        found = _platforms_from_feeders(left, near, carrying) or _platforms_from_feeders(
             [name for name in left if moved.keys() >= set(near[name])], far, carrying
         )
         # What no chain reaches is on the first of all.
         carrying |= found or dict.fromkeys(left, next(iter(known), ""))
         left = [name for name in left if name not in carrying]
     for name in sorted(carrying):
-        mine, feeders = carrying[name], _carriers_of_blocks(near[name], carrying)
+        mine, feeders = carrying[name], _first_block_by_platform(near[name], carrying)
         is_settled = bool(feeders) or scene.blocks[name].options.platform is not None
-        feeders = feeders if is_settled else _carriers_of_blocks(far[name], carrying)
+        feeders = feeders if is_settled else _first_block_by_platform(far[name], carrying)
         for other in sorted(feeders.keys() - {mine}):
             by = f"{feeders[mine]} feeds it" if mine in feeders else "its key platform says"
             how = "a block looks from one place; give each platform one of its own"
@@ -61,7 +61,7 @@ def platform_by_block(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[
 
 
 def _feeding_blocks(scene: Scene, name: str, *, between: bool) -> list[str]:
-    """Return the blocks that feed one, over inputs between platforms or over the others."""
+    """Return the blocks that feed `name` between platforms, or with `between` False otherwise."""
     inputs = scene.blocks[name].cls.inputs
     return [
         wire.source
@@ -70,16 +70,16 @@ def _feeding_blocks(scene: Scene, name: str, *, between: bool) -> list[str]:
     ]
 
 
-def _carriers_by_feeders(
+def _platforms_from_feeders(
     names: Sequence[str], feeding: Mapping[str, Sequence[str]], carrying: Mapping[str, str]
 ) -> dict[str, str]:
-    """Return what carries those of some blocks of which a feeder is known."""
-    carried = {name: _carriers_of_blocks(feeding[name], carrying) for name in names}
+    """Return block → platform, for those blocks that have a feeder on a known platform."""
+    carried = {name: _first_block_by_platform(feeding[name], carrying) for name in names}
     return {name: min(feeders) for name, feeders in carried.items() if feeders}
 
 
-def _carriers_of_blocks(sources: Sequence[str], carrying: Mapping[str, str]) -> dict[str, str]:
-    """Return what carries some blocks, with the first of them on each."""
+def _first_block_by_platform(sources: Sequence[str], carrying: Mapping[str, str]) -> dict[str, str]:
+    """Return platform → the first of the given blocks that it carries."""
     found: dict[str, str] = {}
     for source in sources:
         if source in carrying:
@@ -88,7 +88,9 @@ def _carriers_of_blocks(sources: Sequence[str], carrying: Mapping[str, str]) -> 
 
 
 def _explain_no_platform(scene: Scene, name: str, known: Sequence[str] | None) -> Problem:
-    """Return why what a block's table names cannot carry it; `known` is None of who moves all."""
+    """Return the problem with the platform that a block's table names; `known` is None if the block
+    itself moves the platforms.
+    """
     said = scene.blocks[name].options.platform or ""
     if known is None:
         why = "it moves all platforms and is on none: name it at the blocks that look from it"

@@ -3,48 +3,48 @@
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from dsa_des.block.foreign import NotAllowed, NotImportable, load_named
+from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, load_named
 from dsa_des.errors import did_you_mean
 
 
 class Job(Protocol):
-    """A message that waits: its block, and the tick at which it came."""
+    """Interface of a message that waits: its block, and the tick at which it entered."""
 
     block: str
     entered: int
 
 
 class QueuePolicy:
-    """Every message waits in line (``wait``); a subclass lets some go.
+    """Policy by which every message waits in line (``wait``); subclasses drop or skip some.
 
     It has no state: its answers follow from the jobs in line.
     """
 
     def skips(self, busy: bool) -> bool:
-        """Return whether a scan is left out while the processor is busy or is not.
+        """Return whether a scan is to be skipped, given whether the processor is busy.
 
         Asked when the scan is due, and when its message comes: another block may have been first.
         """
         return False
 
     def dropped(self, waiting: Sequence[Job], new: Job) -> Sequence[Job]:
-        """Return which jobs go, of those that wait in line (the oldest first) and a new one."""
+        """Return the jobs to be dropped, given those that wait (oldest first) and a new one."""
         return ()
 
 
 class DropOldest(QueuePolicy):
-    """Only the newest message waits."""
+    """Policy by which only the newest message waits."""
 
     def dropped(self, waiting: Sequence[Job], new: Job) -> Sequence[Job]:
-        """Let go of what waits."""
+        """Return all waiting jobs, so that only the new one stays."""
         return waiting
 
 
 class Skip(QueuePolicy):
-    """Scans that find the processor busy are left out."""
+    """Policy by which scans are skipped while the processor is busy."""
 
     def skips(self, busy: bool) -> bool:
-        """Leave it out while the processor is busy."""
+        """Skip the scan while the processor is busy."""
         return busy
 
 
@@ -56,7 +56,7 @@ POLICIES: dict[str, type[QueuePolicy]] = {
 
 
 def find_policy(name: Any) -> type[QueuePolicy]:
-    """Return the policy of a name, ``module:Class`` or ``./file.py:Class``, or raise ValueError."""
+    """Return the queue policy of a name, ``module:Class`` or ``./file.py:Class``; or ValueError."""
     if name in POLICIES:
         return POLICIES[name]
     if not isinstance(name, str) or ":" not in name:

@@ -10,7 +10,7 @@ from typing import Any
 
 import networkx as nx
 
-from dsa_des.block.component import Component, Context, Parameters, scene_number
+from dsa_des.block.component import Component, Context, Parameters, to_scene_number
 from dsa_des.block.foreign_calls import REFUSALS, describe_error, is_stop_request
 from dsa_des.block.registry import section_models
 from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
@@ -24,9 +24,9 @@ from dsa_des.scene.changes import (
     stretches_of,
 )
 from dsa_des.scene.checks import (
-    check_activity,
+    check_blocks_can_run,
     check_effects,
-    check_times,
+    checked_ticks_per_s,
     read_blocks,
     read_clocks,
     read_duration,
@@ -65,7 +65,7 @@ _WIDTH, _MOST_LINES = 84, 5
 
 @dataclass(repr=False)
 class Scene:
-    """A checked scene; `set` and `swap` give changed ones.
+    """A scene that has been checked; `set` and `swap` return changed copies.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ class Scene:
 
     @property
     def origin(self) -> tuple[SceneFile, tuple[Change, ...]]:
-        """The tables that the scene was made of, as they were read, and their changes.
+        """The tables that the scene was made from, as read, and the changes made to them.
 
         Raises
         ------
@@ -198,11 +198,11 @@ class Scene:
     def _change(self, values: Mapping[str, Any], source: str) -> "Scene":
         changes = read_python_changes(values, source)
         file, before = self.origin
-        return changed_tables(file, (*before, *changes))
+        return scene_with_changes(file, (*before, *changes))
 
     @property
     def tolerance(self) -> dict[str, float]:
-        """What ``[accuracy]`` allows, by quantity; empty when the scene has no such table."""
+        """Largest allowed error by quantity, from ``[accuracy]``; empty without such a table."""
         accuracy = self.sections.get(_TOLERANCE)
         return {} if accuracy is None else accuracy.model_dump(exclude_none=True)
 
@@ -212,18 +212,18 @@ class Scene:
         return {name: block.cls for name, block in self.blocks.items()}
 
     def problem(self, key: str, message: str) -> Problem:
-        """Return what is wrong with a dotted key of this scene."""
+        """Return a `Problem` with this message at a dotted key of the scene."""
         return Problem(str(self.path), key, message)
 
     def setup_refusal(self, name: str, text: str) -> Problem:
-        """Return what a block refuses at its start, at the key that its text begins with."""
+        """Return the problem with a block that refused to start, at the key that it names first."""
         if self._tables is None:
             return self.problem(dotted_key(("blocks", name)), text)
         return block_refusal(self._tables, name, self.blocks[name].parameters, text)
 
     @property
     def queues(self) -> dict[str, list[str]]:
-        """The blocks that line up at each shared processor, by its name."""
+        """Shared processor → the blocks whose messages queue at it."""
         queues: dict[str, list[str]] = {name: [] for name in sorted(self.processors)}
         for name, block in sorted(self.blocks.items()):
             if block.options.processor:
@@ -236,7 +236,7 @@ class Scene:
         if self.description:
             tables["description"] = self.description
         if self.duration_s is not None:
-            tables["duration_s"] = scene_number(self.duration_s)
+            tables["duration_s"] = to_scene_number(self.duration_s)
         tables["seed"] = self.seed
         tables["wires"] = [wire.to_entry() for wire in self.wires]
         for name, section in self.sections.items():
@@ -265,7 +265,7 @@ def load_scene(
     seed: int | None = None,
     duration_s: object = None,
 ) -> Scene:
-    """Read, override and check a scene.
+    """Read a scene, apply command-line changes, check it and return it.
 
     Parameters
     ----------
@@ -288,7 +288,7 @@ def load_tables(
     seed: int | None = None,
     duration_s: object = None,
 ) -> Scene:
-    """Override and check tables that were read; see `load_scene`."""
+    """Return the checked scene of tables with command-line changes; see `load_scene`."""
     changes, scene_file.problems = read_changes(sets, swaps, seed, duration_s)
     dropped = apply_changes(scene_file, changes)
     scene = check_scene(scene_file)
@@ -296,8 +296,8 @@ def load_tables(
     return scene
 
 
-def changed_tables(file: SceneFile, changes: tuple[Change, ...]) -> Scene:
-    """Return the checked scene that a program's changes make of tables; those stay as they are."""
+def scene_with_changes(file: SceneFile, changes: tuple[Change, ...]) -> Scene:
+    """Return the checked scene of tables with a program's changes; the tables stay unchanged."""
     changed = file.copy()
     dropped = apply_changes(changed, changes, IN_SET, IN_SWAP, "")
     scene = check_scene(changed)
@@ -306,7 +306,7 @@ def changed_tables(file: SceneFile, changes: tuple[Change, ...]) -> Scene:
 
 
 def check_scene(scene_file: SceneFile) -> Scene:
-    """Validate merged tables into a `Scene`.
+    """Check merged tables and return them as a `Scene`.
 
     Raises
     ------
@@ -339,10 +339,10 @@ def check_scene(scene_file: SceneFile) -> Scene:
     graph = build_graph(list(classes), wires)
     check_graph(scene_file, graph, classes, unsure)
     clocks = read_clocks(scene_file, blocks)
-    ticks_per_s = check_times(scene_file, blocks, clocks, wires, duration, processors)
+    ticks_per_s = checked_ticks_per_s(scene_file, blocks, clocks, wires, duration, processors)
     check_effects(scene_file, blocks)
     if not unsure:
-        check_activity(scene_file, blocks, clocks, wires)
+        check_blocks_can_run(scene_file, blocks, clocks, wires)
     scene = Scene(
         Path(scene_file.path), title, description, seed, duration, blocks, wires, graph,
         ticks_per_s, sections, processors, notes=notes,
@@ -360,7 +360,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
 
 
 def _refusals_of_blocks(scene: Scene) -> list[Problem]:
-    """Return what blocks would refuse next, once what is wrong elsewhere is right.
+    """Return the problems of blocks that refuse to be built, to show along with other errors.
 
     Each is made alone: a file that is not there, or two intruders of one name, show by that.
     """
@@ -378,7 +378,7 @@ def _refusals_of_blocks(scene: Scene) -> list[Problem]:
 
 
 def describe_scene(scene: Scene) -> str:
-    """Return a scene in at most ten lines."""
+    """Return a description of a scene in at most ten lines: title, length, seed, blocks."""
     length = "as long as its sources" if scene.duration_s is None else f"{scene.duration_s} s"
     types = ", ".join(f"{name} = {block.type_name}" for name, block in scene.blocks.items())
     blocks = wrap(printable(types), _WIDTH, break_long_words=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.registry import add_source
+from dsa_des.block.registry import with_source_folder
 from dsa_des.block.shipped_files import find_shipped_files, shipped_files
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.files.input_files import (
@@ -59,7 +59,7 @@ class SceneFile:
     problems: list[Problem] = field(default_factory=list)
 
     def copy(self) -> "SceneFile":
-        """Return tables that can be changed without changing these."""
+        """Return a copy of the file's tables that can be changed without changing these."""
         tables = replace(self, data=deepcopy(self.data), problems=[*self.problems])
         for name in ("sources", "of_other_type", "beside", "replaced"):
             setattr(tables, name, dict(getattr(self, name)))
@@ -73,15 +73,15 @@ class SceneFile:
         return str(self.path)
 
     def problem(self, key: Key, message: str, *value: Any) -> Problem:
-        """Return a `Problem` at `key`, naming the file that holds it."""
+        """Return a `Problem` with this message at `key`, naming the file that holds the key."""
         return Problem(self.source_of(key), dotted_key(key), message, *value)
 
     def report(self, key: Key, message: str, *value: Any) -> None:
-        """Add a problem at `key`."""
+        """Add a problem with this message at `key` to the file's problems."""
         self.problems.append(self.problem(key, message, *value))
 
     def refuse(self) -> None:
-        """Raise a `SceneError` of all problems, each said once, if there are any."""
+        """Raise a `SceneError` with all problems, duplicates removed, if there are any."""
         if self.problems:
             raise SceneError({str(problem): problem for problem in self.problems}.values())
 
@@ -90,18 +90,18 @@ def read_scene_file(path: Path | str) -> SceneFile:
     """Read a scene with everything it extends."""
     path = Path(path)
     reader = _Reader()
-    data = reader.file(path, (), ())
+    data = reader.read_file_tables(path, (), ())
     if reader.problems:
         raise SceneError(reader.problems)
     return reader.scene_file(path, data, reader.sources)
 
 
 def read_scene_tables(tables: Mapping[str, Any], name: str) -> SceneFile:
-    """Take tables, which messages call `name`, as a scene file of the working directory."""
+    """Return tables, with all they extend, as a scene file `name` in the working directory."""
     here = Path.cwd() / name
     reader = _Reader()
     reader.sources[()] = str(here)
-    data = reader.table(tables, here)
+    data = reader.merge_tables(tables, here)
     if reader.problems:
         raise SceneError(
             replace(p, source=name) if p.source == str(here) else p for p in reader.problems
@@ -123,14 +123,16 @@ class _Reader:
         of = self._inheritance
         return SceneFile(path, data, sources, of.of_other_type, of.beside, of.replaced)
 
-    def file(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
-        self._count(path, _VALUES_PER_FILE)
+    def read_file_tables(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
+        self._count_values(path, _VALUES_PER_FILE)
         if path not in self._read:
-            self._read[path] = _tables_of(path)
+            self._read[path] = _read_tables_or_error(path)
         real, tables = self._read[path]
         if isinstance(tables, dict) and real not in chain and len(chain) < _LONGEST_CHAIN:
             self.sources[at] = str(path)
-            return self._finish(tables, self._table(tables, path, at, (*chain, real)), at)
+            return self._finish_tables(
+                tables, self._merge_with_bases(tables, path, at, (*chain, real)), at
+            )
         if isinstance(tables, TomlError):
             self.problems.append(Problem(str(path), "", str(tables)))
             return {}
@@ -142,7 +144,7 @@ class _Reader:
             message += f"at most {_LONGEST_CHAIN} are read"
         elif isinstance(tables, NoSuchFile):
             what = f"there is no file {name}" if chain else "there is no such file"
-            message = what + _similar_file(path, shipped=bool(chain))
+            message = what + _similar_file_hint(path, shipped=bool(chain))
         elif is_folder(path):
             message = f"{f'{name} ' if chain else ''}is a folder; a TOML file is needed"
         else:
@@ -155,20 +157,22 @@ class _Reader:
             self.problems.append(Problem(str(path), "", message))
         return {}
 
-    def table(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
-        return self._finish(tables, self._table(tables, path, (), (path,)), ())
+    def merge_tables(self, tables: Mapping[str, Any], path: Path) -> dict[str, Any]:
+        return self._finish_tables(tables, self._merge_with_bases(tables, path, (), (path,)), ())
 
-    def _finish(self, own: Mapping[str, Any], merged: dict[str, Any], at: Key) -> dict[str, Any]:
-        self._inheritance.note_beside(own, merged, at)
-        return self._inheritance.finish(merged, at)
+    def _finish_tables(
+        self, own: Mapping[str, Any], merged: dict[str, Any], at: Key
+    ) -> dict[str, Any]:
+        self._inheritance.note_values_beside(own, merged, at)
+        return self._inheritance.finish_removals(merged, at)
 
-    def _count(self, path: Path, values: int = 1) -> None:
+    def _count_values(self, path: Path, values: int = 1) -> None:
         self._taken += values
         if self._taken > _MOST_VALUES:
             message = f"with all that it extends, has more than {_MOST_VALUES:,} values"
             raise SceneError([Problem(str(path), "", message)])
 
-    def _table(
+    def _merge_with_bases(
         self, table: Mapping[str, Any], path: Path, at: Key, chain: tuple[Path, ...]
     ) -> dict[str, Any]:
         if len(at) > DEEPEST:
@@ -186,20 +190,20 @@ class _Reader:
             self.sources.setdefault(at, str(path))
             base_source = self.sources[at]
             self._inheritance.merge(
-                merged, self.file(self._extended_path(path, base), at, chain), at
+                merged, self.read_file_tables(self._extended_path(path, base), at, chain), at
             )
             self.sources[at] = base_source
         own = {
-            key: self._value(value, path, (*at, key), chain)
+            key: self._resolve_value(value, path, (*at, key), chain)
             for key, value in table.items()
             if key != "extends"
         }
         if REMOVE in own:
-            own[REMOVE] = self._inheritance.removals(own[REMOVE], str(path))
+            own[REMOVE] = self._inheritance.parse_removals(own[REMOVE], str(path))
         return self._inheritance.merge(merged, own, at)
 
     def _extended_path(self, path: Path, base: str) -> Path:
-        """Return the file that one extends: beside it, or else the shipped one of that name."""
+        """Return the path ``extends`` means: beside `path`, or the one shipped file so named."""
         beside = path.parent / base
         if "\0" in base or os.path.lexists(beside):
             return beside
@@ -209,21 +213,23 @@ class _Reader:
             raise SceneError([Problem(str(path), "extends", str(error))]) from None
         return shipped[0] if len(shipped) == 1 else beside
 
-    def _value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
-        self._count(path)
+    def _resolve_value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
+        self._count_values(path)
         self.sources[at] = str(path)
         self._inheritance.of_other_type.pop(at, None)
         if isinstance(value, dict):
-            return self._table(value, path, at, chain)
+            return self._merge_with_bases(value, path, at, chain)
         if isinstance(value, list):
-            return [self._value(item, path, (*at, i), chain) for i, item in enumerate(value)]
+            return [
+                self._resolve_value(item, path, (*at, i), chain) for i, item in enumerate(value)
+            ]
         if isinstance(value, str):
-            return add_source(value, path.parent)
+            return with_source_folder(value, path.parent)
         return value
 
 
-def _tables_of(path: Path) -> tuple[Path, dict[str, Any] | Exception]:
-    """Return the real path of a file, and its tables or why it has none."""
+def _read_tables_or_error(path: Path) -> tuple[Path, dict[str, Any] | Exception]:
+    """Return a TOML file's real path, and its tables or the error if it cannot be read."""
     try:
         text = read_input_text(path, LARGEST_TOML_BYTES)
         return Path(os.path.realpath(path)), parse_toml(text)
@@ -232,12 +238,12 @@ def _tables_of(path: Path) -> tuple[Path, dict[str, Any] | Exception]:
 
 
 def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
-    """Put the keys of `over` into `base`, table by table, and return `base`."""
+    """Merge `over` into `base` in place, table by table, and return `base`."""
     return Inheritance({}, []).merge(base, over, ())
 
 
-def _similar_file(path: Path, shipped: bool) -> str:
-    """Return which file was meant: one beside, or else a shipped one where that would do."""
+def _similar_file_hint(path: Path, shipped: bool) -> str:
+    """Return a hint at the file meant, beside `path` or shipped, or a missing folder; or empty."""
     from dsa_des.errors import nearest_name
 
     missing, names = "", []

@@ -17,7 +17,7 @@ from fractions import Fraction
 from itertools import pairwise
 from typing import Any
 
-from dsa_des.block.component import Component, scene_number
+from dsa_des.block.component import Component, to_scene_number
 from dsa_des.errors import Problem, did_you_mean, nearest_name
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.keys import Key
@@ -59,12 +59,12 @@ class Wire:
 
     @property
     def is_delayed(self) -> bool:
-        """Whether messages surely arrive later than they were made."""
+        """Whether messages certainly arrive later than made, by a delay or a processor's queue."""
         return self.total_delay_s > 0 or self.delay_scans > 0 or self.queued
 
     @property
     def total_delay_s(self) -> Fraction:
-        """Time on the wire and, before it, in the sending block."""
+        """Delay on the wire plus latency of the sending block, s."""
         # Studies ask this of every wire of every replica, and sums of fractions are slow.
         return self.delay_s + self.latency_s if self.latency_s else self.delay_s
 
@@ -83,9 +83,9 @@ class Wire:
         if self.delay_scans:
             table["delay"] = f"{self.delay_scans} scan{'s' if self.delay_scans > 1 else ''}"
         elif self.delay_s:
-            table["delay_s"] = scene_number(self.delay_s)
+            table["delay_s"] = to_scene_number(self.delay_s)
         if self.jitter_s:
-            table["jitter_s"] = scene_number(self.jitter_s)
+            table["jitter_s"] = to_scene_number(self.jitter_s)
         if self.drop_probability:
             table["drop_probability"] = self.drop_probability
         if self.holds is not None:
@@ -98,7 +98,7 @@ def read_wires(
     classes: Mapping[str, type[Component]],
     unsure: set[str],
 ) -> list[Wire]:
-    """Return the wires of a scene, sorted; what is wrong with them is reported.
+    """Return the wires of a scene, sorted; what is wrong with them is added to its problems.
 
     Wires of blocks whose class is None, not known, are not judged. `unsure` receives the blocks
     that a faulty wire meant to feed.
@@ -136,8 +136,8 @@ def read_wires(
     return sorted(wires, key=lambda w: (w.target, w.input, w.source, w.output))
 
 
-def block_name_refusal(name: str) -> str | None:
-    """Return why no wire can name a block of this name, if so."""
+def explain_bad_block_name(name: str) -> str | None:
+    """Return why a name cannot be a block's name; None if it can."""
     if re.fullmatch(_NAME, name):
         return None
     return (
@@ -147,7 +147,7 @@ def block_name_refusal(name: str) -> str | None:
 
 
 class _WireError(Exception):
-    """What is wrong with a wire, or with one `option` of it."""
+    """Raised for a wire, or one `option` of it, that is wrong."""
 
     def __init__(self, message: str, *value: Any, option: str | None = None) -> None:
         self.value = value
@@ -273,7 +273,7 @@ def _report_double_writers(
 
 
 def add_block_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:
-    """Return the wires with what their sending blocks add to the delay."""
+    """Return the wires with their senders' latency, marked if sent through a shared processor."""
     return [
         replace(
             wire,

@@ -10,7 +10,7 @@ from dsa_des.errors import did_you_mean
 
 
 class Outage(Parameters):
-    """An item of ``outages``: times between failures and to repair are exponential."""
+    """Outages of blocks (``outages``); times between failures and to repair are exponential."""
 
     name: str | None = Field(
         default=None, description="What fails, as its draws are keyed; by default its blocks."
@@ -36,7 +36,7 @@ class Outage(Parameters):
 
     @property
     def key(self) -> str:
-        """What its draws are keyed by."""
+        """Name that keys the random draws of the outage: its `name`, or else its blocks."""
         return self.name or ", ".join(self.blocks)
 
     def sentence(self) -> str:
@@ -62,7 +62,7 @@ class Outage(Parameters):
         return self
 
     def refusals(self, blocks: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str, Any]]:
-        """Yield what blocks of a scene cannot do: the key, why, and the value.
+        """Yield (key, message, value) for what the outage asks of blocks that cannot do it.
 
         `blocks` are the classes of the scene's blocks, None where one is not known.
         """

@@ -4,21 +4,21 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, last_position_in_run
+from dsa_des.arrays.run_ticks import RunTicks, last_position_at_or_before
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Arrivals, Wake
 from dsa_des.record.failure_counts import SECONDS_FAILED
 from dsa_des.stretches.outage import Outage
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 # So many failures of each run are drawn at a time.
 _AT_ONCE = 32
 
 
 class Outages:
-    """When a block is out, in every run: whenever one of what it depends on is.
+    """Random failures and repairs of one block in every run, from all outages that concern it.
 
     An outage lasts from a failure to the repair and the restart. Its block does not run then, and
     what comes over its wires is lost; what it remembers it still does afterwards. In the other
@@ -36,7 +36,7 @@ class Outages:
         self._last: dict[str, Message] = {}
 
     def _draw_outages(self, one: Outage, streams: Streams) -> RunTicks:
-        """Return when it fails and is back, in turns, of the first run, the second, and so on."""
+        """Return the alternating ticks of failure and return to service, run after run."""
         stream = streams.stream("[outages]", one.key)
         count, lasts_s = self._runs.count, self._runs.run_ticks / self._ticks_per_s
         now_s = np.zeros((count, 1))
@@ -60,32 +60,32 @@ class Outages:
         return RunTicks(np.repeat(np.arange(count), width), ticks.reshape(-1))
 
     def is_up(self, instants: RunTicks) -> BoolArray:
-        """Return at which instants the block runs."""
-        return ~self._failed("silent", instants)
+        """Return a mask of the instants, True where the block runs, False in a silent outage."""
+        return ~self._is_failed_in_mode("silent", instants)
 
-    def _failed(self, mode: str, instants: RunTicks) -> BoolArray:
-        """Return at which instants the block is out in a mode."""
+    def _is_failed_in_mode(self, mode: str, instants: RunTicks) -> BoolArray:
+        """Return a mask of the instants, True where the block has failed in this mode."""
         failed = np.zeros(len(instants), dtype=bool)
         for one, edges in zip(self._failing, self._edges, strict=True):
             if one.mode == mode:
                 failed |= _is_in_outage(edges, instants)
         return failed
 
-    def sent(self, port: str, message: Message) -> Message:
-        """Return the message that leaves the block in place of the one that it sends."""
+    def corrupt_output(self, port: str, message: Message) -> Message:
+        """Return the message really sent: with stuck bits and frozen values in such outages."""
         for one, edges in zip(self._failing, self._edges, strict=True):
             for quantity, worth in one.stuck.items():
                 message = message.with_stuck_bit(
                     _is_in_outage(edges, message.instants), quantity, worth
                 )
-        return self._frozen(port, message) if self._freezes else message
+        return self._freeze_rows(port, message) if self._freezes else message
 
-    def _frozen(self, port: str, message: Message) -> Message:
-        """Return a message with the last good row of each run in place of those while frozen."""
+    def _freeze_rows(self, port: str, message: Message) -> Message:
+        """Return the message, frozen rows replaced by the run's last good row; remember that."""
         before = [self._last[port]] if port in self._last else []
         known = sum(map(len, before))
         both = message.concatenate([*before, message])
-        good = np.append(np.ones(known, bool), ~self._failed("frozen", message.instants))
+        good = np.append(np.ones(known, bool), ~self._is_failed_in_mode("frozen", message.instants))
         order = np.argsort(both.run, kind="stable")
         run, place = both.run[order], np.arange(len(order))
         last = np.maximum.accumulate(np.where(good[order], place, -1))
@@ -99,8 +99,8 @@ class Outages:
         later = both.tick[known:] - both.tick[source[known:]]
         return message.repeat_rows(both, source[known:], later / self._ticks_per_s)
 
-    def drop_unheard(self, wake: Wake) -> Wake:
-        """Return a wake without what arrived while the block was out."""
+    def drop_arrivals_during_outage(self, wake: Wake) -> Wake:
+        """Return a wake without the messages that arrived while the block was out."""
         arrived: dict[str, list[Arrivals]] = {}
         for port, every in wake._arrived.items():
             for new in every:
@@ -108,25 +108,25 @@ class Outages:
                 if len(rows):
                     part = Arrivals(new.source, new.instants.take(rows), new.message.take(rows))
                     arrived.setdefault(port, []).append(part)
-        return wake.part(np.arange(len(wake)), arrived) if wake._arrived else wake
+        return wake.select_rows(np.arange(len(wake)), arrived) if wake._arrived else wake
 
-    def spans(self, run: int) -> IntArray:
-        """Return when the block is out in a run, in order: first tick, and the first after it."""
+    def outage_spans(self, run: int) -> IntArray:
+        """Return a run's spans of ticks [start, end) of outage, (spans, 2), sorted and merged."""
         spans = np.concatenate([e.tick.reshape(self._runs.count, -1)[run] for e in self._edges])
         return merge_spans(spans.reshape(-1, 2), int(self._runs.ends[run]))
 
     def failure_counts(self) -> Mapping[str, IntArray]:
-        """Return how many seconds of each run the block had failed, as counts (2, runs)."""
+        """Return one kind of failure → (2, runs): seconds of outage, and seconds of the run."""
         ends = self._runs.ends
-        each = map(self.spans, range(self._runs.count))
+        each = map(self.outage_spans, range(self._runs.count))
         out = [int((spans[:, 1] - spans[:, 0]).sum()) for spans in each]
         seconds = np.rint(np.array([out, ends]) / self._ticks_per_s).astype(np.int64)
         return {SECONDS_FAILED: seconds}
 
 
 def _is_in_outage(edges: RunTicks, instants: RunTicks) -> BoolArray:
-    """Return which instants lie in an outage; edges are failures and repairs, in turns."""
-    last = last_position_in_run(edges, instants)
+    """Return which instants lie in an outage (mask); `edges` alternate failures and repairs."""
+    last = last_position_at_or_before(edges, instants)
     there = (last >= 0) & (edges.run[last] == instants.run)
     # Failures are even, as every run has as many.
     out: BoolArray = there & (last % 2 == 0)
@@ -134,7 +134,7 @@ def _is_in_outage(edges: RunTicks, instants: RunTicks) -> BoolArray:
 
 
 def merge_spans(spans: IntArray, end: int) -> IntArray:
-    """Return spans of ticks (spans, 2) before an end, in order, those that touch as one."""
+    """Return spans of ticks (spans, 2), cut at `end`, sorted, merged if they overlap or touch."""
     first, last = np.minimum(spans[np.argsort(spans[:, 0], kind="stable")], end).T
     reached = np.maximum.accumulate(last)
     new = np.append(True, first[1:] > reached[:-1])[: len(first)]

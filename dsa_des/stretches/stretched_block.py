@@ -15,7 +15,7 @@ from dsa_des.block.wake import Arrivals, Wake
 
 
 class StretchedBlock:
-    """The instances of a block, one for each stretch; neighbouring stretches may share theirs.
+    """A block with an instance for each stretch between changes; neighbours may share one.
 
     `from_ticks` are the first ticks of the stretches, ascending, the first one 0.
     """
@@ -27,26 +27,26 @@ class StretchedBlock:
         self._now = 0
 
     @property
-    def now(self) -> Component:
-        """The instance that holds what the block remembers."""
+    def current_instance(self) -> Component:
+        """The instance in force now, which holds the block's state."""
         return self._instances[self._now]
 
     @property
     def state_objects(self) -> list[object]:
-        """All objects whose attributes hold the state of the block, this one among them."""
+        """All objects whose attributes hold the block's state, including this one."""
         each = {id(one): one for one in self._instances}.values()
         effects = [effect for one in each for effect in one.context.effects.values()]
         return [self, *each, *effects]
 
-    def parts(self, wake: Wake) -> Iterator[tuple[Component, Wake]]:
-        """Yield the rows of each stretch in turn, and the instance that handles them then.
+    def split_by_stretch(self, wake: Wake) -> Iterator[tuple[Component, Wake]]:
+        """Yield (instance, part of the wake) for each stretch with instants, in order of time.
 
         What arrived comes with the rows of its stretch, or else with the next ones.
         """
-        of = self._stretch_of(wake.ticks)
+        of = self._stretch_index(wake.ticks)
         stretches = np.unique(of)
         if len(stretches) == 1:
-            yield self._go_to(int(stretches[0])), wake
+            yield self._switch_to_stretch(int(stretches[0])), wake
             return
         for place, stretch in enumerate(stretches.tolist()):
             arrived = {
@@ -57,24 +57,27 @@ class StretchedBlock:
                 ]
                 for port, every in wake._arrived.items()
             }
-            yield self._go_to(stretch), wake.part(np.flatnonzero(of == stretch), arrived)
+            yield (
+                self._switch_to_stretch(stretch),
+                wake.select_rows(np.flatnonzero(of == stretch), arrived),
+            )
 
     def _arrivals_of_stretch(
         self, new: Arrivals, stretches: IntArray, place: int
     ) -> Arrivals | None:
-        """Return what of some arrivals comes with the rows of one of the stretches."""
-        with_rows = np.searchsorted(stretches, self._stretch_of(new.tick))
+        """Return the arrivals handed over with the rows of one stretch; None if there are none."""
+        with_rows = np.searchsorted(stretches, self._stretch_index(new.tick))
         rows = np.flatnonzero(np.minimum(with_rows, len(stretches) - 1) == place)
         if len(rows) == 0:
             return None
         return Arrivals(new.source, new.instants.take(rows), new.message.take(rows))
 
-    def _stretch_of(self, ticks: IntArray) -> IntArray:
+    def _stretch_index(self, ticks: IntArray) -> IntArray:
         of: IntArray = np.searchsorted(self._from_ticks, ticks, side="right") - 1
         return of
 
-    def _go_to(self, stretch: int) -> Component:
-        before, self._now = self.now, stretch
-        if self.now is not before:
-            self.now.adopt_state(before)
-        return self.now
+    def _switch_to_stretch(self, stretch: int) -> Component:
+        before, self._now = self.current_instance, stretch
+        if self.current_instance is not before:
+            self.current_instance.adopt_state(before)
+        return self.current_instance

@@ -20,7 +20,7 @@ No π is below `LEAST`, and in the first round below `FIRST_LEAST`: what nobody 
 too, and weighs 1/π then. Rounds are few, because each flies a lock step of its own, whose windows
 cost as much as a thousand runs.
 
-Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen`.
+Pure functions of arrays; which columns they are is said by `dsa_des.studies.foreseen_runs`.
 """
 
 from collections.abc import Sequence
@@ -57,7 +57,7 @@ _LEAST_CHANCE = 1e-12
 
 @dataclass(frozen=True)
 class ForeseenRuns:
-    """Runs as their geometry and nominal flights tell them, before they are flown.
+    """What is known of runs before flight: geometry, nominal events, expected chances, weights.
 
     Geometry (numbers, runs); nominal flags (events, runs), 0 outside an event's class; the chance
     of each event that is expected before anything is flown (events, runs); weights (runs,).
@@ -71,7 +71,7 @@ class ForeseenRuns:
 
 @dataclass(frozen=True)
 class Allocation:
-    """With which probability runs of a cell are flown, by what is known of them."""
+    """A plan of the probability of flying each run of a cell, from what is known beforehand."""
 
     middle: FloatArray
     spread: FloatArray
@@ -90,50 +90,52 @@ class Allocation:
 
     def probabilities(self, runs: ForeseenRuns) -> FloatArray:
         """Return the probability with which each run is flown, (runs,)."""
-        left = remaining_variance(self._chances(runs), self.predicted)
-        worth = np.sqrt(_sum_terms(self.precision, left))
+        left = sampling_variance(self._chances(runs), self.predicted)
+        worth = np.sqrt(_weighted_sum(self.precision, left))
         return flight_probabilities(runs.weight * worth, self.size, self.least)
 
     def predictions(self, runs: ForeseenRuns) -> FloatArray:
-        """Return with what each event counts before a run is flown, (events, runs)."""
+        """Return each event's predicted chance in each run, (events, runs), 0 if not predicted."""
         return np.where(self.predicted[:, np.newaxis], self._chances(runs), 0.0)
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
-        terms = model_terms(self._scale_geometry(runs.geometry), runs.nominal)
+        terms = logistic_model_terms(self._standardise_geometry(runs.geometry), runs.nominal)
         return event_chances(terms, runs, self.coefficients)
 
-    def _scale_geometry(self, geometry: FloatArray) -> FloatArray:
+    def _standardise_geometry(self, geometry: FloatArray) -> FloatArray:
         away = geometry - self.middle[:, None]
         return np.where(np.isfinite(away), away, 0.0) / self.spread[:, None]
 
 
 def flight_probabilities(worth: FloatArray, size: float, least: float) -> FloatArray:
-    """Return probabilities in proportion to what runs are worth, from the least to 1."""
+    """Return the probability to fly each run: `size` times `worth`, held between `least` and 1."""
     if not np.isfinite(size):
         return np.ones(len(worth))
     result: FloatArray = np.clip(size * worth, least, 1.0)
     return result
 
 
-def remaining_variance(chance: FloatArray, predicted: BoolArray) -> FloatArray:
-    """Return what of the variance of events, (events, runs), hangs on how often they are flown."""
+def sampling_variance(chance: FloatArray, predicted: BoolArray) -> FloatArray:
+    """Return the part of each event's variance that depends on how often its run is flown, (events,
+    runs).
+    """
     sure = np.clip(chance, None, _SUREST)
     return np.where(predicted[:, np.newaxis], sure * (1.0 - sure), chance)
 
 
-def model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
-    """Return the terms of the logistic model: geometry, its squares, and all nominal flags."""
+def logistic_model_terms(scaled: FloatArray, nominal: FloatArray) -> FloatArray:
+    """Return the logistic model's terms, (terms, runs): geometry, its squares, nominal flags."""
     within = np.clip(scaled, -4.0, 4.0)
     return np.concatenate([within, within**2 - 1.0, nominal])
 
 
 def event_chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArray) -> FloatArray:
-    """Return the chance of each event by the logistic models, (events, runs)."""
-    offset = _logit_offset(runs.expected)
+    """Return the chance of each event in each run by the logistic models, (events, runs)."""
+    offset = _logit(runs.expected)
     without, having = (
         np.array(
             [
-                _sum_terms(c[k], _design_matrix(terms, of))
+                _weighted_sum(c[k], _design_matrix(terms, of))
                 for c, of in zip(coefficients, offset, strict=True)
             ]
         )
@@ -147,7 +149,7 @@ def event_chances(terms: FloatArray, runs: ForeseenRuns, coefficients: FloatArra
 def learn_allocation(
     runs: ForeseenRuns, happened: FloatArray, stands_for: FloatArray, least: float = LEAST
 ) -> Allocation:
-    """Return the plan for further runs of a cell, from those that are known, flown or not.
+    """Return the plan for further runs of a cell, learnt from earlier runs of it, flown or not.
 
     Parameters
     ----------
@@ -165,36 +167,42 @@ def learn_allocation(
     away = np.where(there, runs.geometry, middle[:, None]) - middle[:, None]
     spread = np.sqrt((away**2).sum(axis=1) / many)
     spread = np.where(spread > 0.0, spread, 1.0)
-    terms = model_terms(away / spread[:, None], runs.nominal)
+    terms = logistic_model_terms(away / spread[:, None], runs.nominal)
     flown = stands_for > 0.0
     fitted = np.zeros((len(happened), 2, 2 + len(terms)))
     for event, (n, e, m) in enumerate(zip(runs.nominal, runs.expected, happened, strict=True)):
         for having in (0, 1):
             some = flown & ((n > 0.0) == having)
             weight = stands_for[some] / stands_for[some].mean() if some.any() else np.empty(0)
-            fitted[event, having] = fit_chances(terms[:, some], e[some], m[some], weight)
+            fitted[event, having] = fit_logistic_coefficients(
+                terms[:, some], e[some], m[some], weight
+            )
     predicted = np.where(flown, happened, 0.0).sum(axis=1) >= PREDICTED_FROM
-    precision, size = best_sample_size(runs, event_chances(terms, runs, fitted), predicted, least)
+    precision, size = best_probability_scale(
+        runs, event_chances(terms, runs, fitted), predicted, least
+    )
     plan = Allocation(middle, spread, fitted, precision, size, predicted, least)
     return replace(plan, share=float(plan.probabilities(runs).mean()))
 
 
-def best_sample_size(
+def best_probability_scale(
     runs: ForeseenRuns, chance: FloatArray, predicted: BoolArray, least: float
 ) -> tuple[FloatArray, float]:
-    """Return 1/V of each event, and the size of π with the least variance times cost."""
+    """Return (1/V of each event, scale of the flight probabilities) with the least variance times
+    cost; an infinite scale flies all.
+    """
     w, n = runs.weight, runs.nominal
     below = (w * n).sum(axis=1)
     there = below > 0.0
     ratio = np.where(there, (w * chance).sum(axis=1) / np.where(there, below, 1.0), 0.0)[:, None]
-    left = remaining_variance(chance, predicted)
+    left = sampling_variance(chance, predicted)
     fixed = (w**2 * (chance - left + ratio**2 * n - 2.0 * ratio * chance * n)).sum(axis=1)
     all_flown = (w**2 * left).sum(axis=1) + fixed
     counts = there & (all_flown > 0.0)
     precision = np.where(counts, 1.0 / np.where(counts, all_flown, 1.0), 0.0)
     if not counts.any():
         return precision, np.inf
-    open_ = _sum_terms(precision, left)
+    open_ = _weighted_sum(precision, left)
     worth = w * np.sqrt(open_)
     scale = 1.0 / max(float(worth.max()), 1e-300)
     costs = []
@@ -208,16 +216,16 @@ def best_sample_size(
     return precision, float(_SIZES[best] * scale) if worth_it else np.inf
 
 
-def fit_chances(
+def fit_logistic_coefficients(
     terms: FloatArray, expected: FloatArray, happened: FloatArray, weight: FloatArray
 ) -> FloatArray:
-    """Return the coefficients of the logistic model that are likeliest, given what was expected.
+    """Return the most probable coefficients of an event's logistic model, from expected chances.
 
     Newton's method on the logarithm of the likelihood and of a normal distribution of the
     coefficients (level, belief, slopes); with no event at all it stays near what was expected. A
     belief of 0 takes the logit of that as it is, one of -1 not at all.
     """
-    offset = _logit_offset(expected)
+    offset = _logit(expected)
     design = _design_matrix(terms, offset)
     sd = np.full(len(design), _SLOPE_SD)
     sd[:2] = _LEVEL_SD, _BELIEF_SD
@@ -242,8 +250,8 @@ def fit_chances(
     return at
 
 
-def _sum_terms(factors: FloatArray, terms: FloatArray) -> FloatArray:
-    """Return a sum of terms (k, runs) with factors (k,), the same for a run alone as among many."""
+def _weighted_sum(factors: FloatArray, terms: FloatArray) -> FloatArray:
+    """Return the sum of terms (k, runs) times factors (k,), rounded alike for one run and many."""
     result = np.zeros(terms.shape[1])
     for factor, term in zip(factors.tolist(), terms, strict=True):
         result += factor * term
@@ -254,7 +262,7 @@ def _design_matrix(terms: FloatArray, offset: FloatArray) -> FloatArray:
     return np.concatenate([np.ones((1, len(offset))), offset[np.newaxis], terms])
 
 
-def _logit_offset(expected: FloatArray) -> FloatArray:
+def _logit(expected: FloatArray) -> FloatArray:
     p = np.clip(expected, _LEAST_CHANCE, 1.0 - _LEAST_CHANCE)
     result: FloatArray = np.log(p / (1.0 - p))
     return result
@@ -266,7 +274,7 @@ def _logistic(score: FloatArray) -> FloatArray:
 
 
 def round_ends(replicas: int, batch: int | None) -> list[int]:
-    """Return the replica before which each round ends; with a `batch`, rounds of so many."""
+    """Return the replica before which each round ends; with a `batch`, rounds of that size."""
     if batch is not None:
         return [min(end, replicas) for end in range(batch, replicas + batch, batch)]
     ends, end = [], PILOT
@@ -276,7 +284,9 @@ def round_ends(replicas: int, batch: int | None) -> list[int]:
     return [*ends, replicas]
 
 
-def draw_runs(probability: FloatArray, uniform: Sequence[float]) -> tuple[BoolArray, FloatArray]:
-    """Return which runs are flown, and for how many each stands."""
+def sample_runs_to_fly(
+    probability: FloatArray, uniform: Sequence[float]
+) -> tuple[BoolArray, FloatArray]:
+    """Return a mask of the runs drawn, and how many runs each stands for: 1 / probability or 0."""
     flown = np.asarray(uniform) < probability
     return flown, np.where(flown, 1.0 / probability, 0.0)

@@ -20,8 +20,8 @@ from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.replicas.lock_step_size import RunSize
 from dsa_des.replicas.replicas import lock_step_refusal
-from dsa_des.running.loops import edges_opening_loops
-from dsa_des.studies.chunk import ChunkResult, crashed_run, join_pieces
+from dsa_des.running.loops import longest_delay_cut_edges
+from dsa_des.studies.chunk import ChunkResult, crashed_chunk_result, join_pieces
 from dsa_des.studies.study import Chunk, Study
 
 #: How often a chunk may lose its process before it is cut.
@@ -32,14 +32,14 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class Piece:
-    """Chunks that are run together, or some runs of one, and how often their process died."""
+    """Chunks to run in one process, or some runs of a chunk, and how often their process died."""
 
     chunks: tuple[Chunk, ...]
     losses: int = 0
 
 
 class Attempts:
-    """What is still to be run: chunks that are run together (`run_together`)."""
+    """The rest of a study: hands out pieces, collects results, retries if a process died."""
 
     def __init__(self, study: Study, together: Iterable[tuple[Chunk, ...]]) -> None:
         self._study = study
@@ -53,7 +53,7 @@ class Attempts:
         self._there: dict[str, list[ChunkResult]] = {}
 
     def next_piece(self) -> Piece | None:
-        """Return what to run next; None if nothing may be begun now."""
+        """Return the next piece to run; None if none may be started now."""
         piece = None
         if self._only:
             return None
@@ -66,24 +66,26 @@ class Attempts:
         self._running += piece is not None
         return piece
 
-    def give_back(self, piece: Piece) -> None:
-        """Take back what was not begun, or was lost through no fault of its own."""
-        self._check_ended()
+    def requeue_piece(self, piece: Piece) -> None:
+        """Put back a piece that was not started, or was lost through no fault of its own."""
+        self._note_piece_ended()
         self._again.append(piece)
 
-    def finish(self, piece: Piece, results: Iterable[ChunkResult]) -> list[ChunkResult]:
-        """Take the results of a piece; return those of chunks of which all is there."""
-        self._check_ended()
-        return [whole for one in results if (whole := self._collect(one)) is not None]
+    def take_results(self, piece: Piece, results: Iterable[ChunkResult]) -> list[ChunkResult]:
+        """Take in a finished piece's results, and return those of chunks that are now complete."""
+        self._note_piece_ended()
+        return [whole for one in results if (whole := self._join_if_complete(one)) is not None]
 
-    def take_back(self, piece: Piece) -> list[ChunkResult]:
-        """Take back a piece whose process died; return its chunk's result if that was the last."""
-        self._check_ended()
+    def retry_after_crash(self, piece: Piece) -> list[ChunkResult]:
+        """Put back a piece whose process died, if need be in parts; if it is given up, return its
+        chunk's result once complete.
+        """
+        self._note_piece_ended()
         chunk, losses = piece.chunks[0], piece.losses + 1
         if len(piece.chunks) > 1:
             self._again += [Piece((one,)) for one in reversed(piece.chunks)]
         elif len(chunk) == 1 and losses >= TRIES:
-            crashed = self._collect(crashed_run(self._study, chunk, TRIES))
+            crashed = self._join_if_complete(crashed_chunk_result(self._study, chunk, TRIES))
             return [] if crashed is None else [crashed]
         elif len(chunk) == 1:
             self._alone.append(Piece((chunk,), losses))
@@ -96,11 +98,11 @@ class Attempts:
                 self._again.append(Piece((half,), 0 if len(half) == 1 else losses - 1))
         return []
 
-    def _check_ended(self) -> None:
+    def _note_piece_ended(self) -> None:
         self._running -= 1
         self._only = False
 
-    def _collect(self, result: ChunkResult) -> ChunkResult | None:
+    def _join_if_complete(self, result: ChunkResult) -> ChunkResult | None:
         name = result.name
         if name not in self._missing:
             return result
@@ -112,10 +114,10 @@ class Attempts:
         return join_pieces(name, self._there.pop(name))
 
 
-def run_together(
+def group_chunks(
     study: Study, chunks: Sequence[Chunk], workers: int
 ) -> Iterator[tuple[Chunk, ...]]:
-    """Put consecutive chunks of a cell together that share lock steps, about alike for workers."""
+    """Yield groups of a cell's consecutive chunks for lock steps, with equal work per worker."""
     if len(chunks) < 2:
         yield from ((chunk,) for chunk in chunks)
         return
@@ -131,7 +133,7 @@ def run_together(
 
 
 def _consecutive_chunks(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
-    """Give consecutive chunks each of which begins in the cell that the one before ends in."""
+    """Yield lists of consecutive chunks, each beginning in the cell where the one before ends."""
     chain: list[Chunk] = []
     for chunk in chunks:
         if chain and chain[-1].runs[-1][0] != chunk.runs[0][0]:
@@ -142,17 +144,17 @@ def _consecutive_chunks(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
 
 
 def _lock_step_size(study: Study, cell: int) -> int:
-    """Return how many runs of a cell a lock step holds, 0 where it spares nothing.
+    """Return how many runs of a cell one lock step holds; 0 if lock step saves nothing.
 
     A feedback loop goes through as many windows, whatever these hold.
     """
     try:
         scene = study.scene(cell)
-        if not edges_opening_loops(scene) or lock_step_refusal(
+        if not longest_delay_cut_edges(scene) or lock_step_refusal(
             scene, [study.replica(n, cell) for n in (0, 1)]
         ):
             return 0
-        return RunSize.of(replica_scene(scene, study.replica(0, cell)), {}).most
+        return RunSize.estimate(replica_scene(scene, study.replica(0, cell)), {}).largest_run_count
     except (SceneError, BlockFailure):  # its rows say why
         return 0
 

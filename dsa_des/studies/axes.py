@@ -9,7 +9,7 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
-from dsa_des.block.component import scene_number
+from dsa_des.block.component import to_scene_number
 from dsa_des.block.source_file import absolute_type_name
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.keys import flatten_tables
@@ -46,21 +46,21 @@ class Axis:
 
     @property
     def numeric(self) -> bool:
-        """Whether its values are numbers."""
+        """Whether all values of the axis are numbers."""
         return all(
             isinstance(label, int | float) and not isinstance(label, bool) for label in self.labels
         )
 
 
 def flatten_axes(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return dotted key → list or table of every axis; nested tables are keys of the scene."""
+    """Return dotted key → list or table that defines the axis, for all axes in nested tables."""
     return flatten_tables(
         tables, lambda v: not isinstance(v, dict) or not v or bool(set(v) & set(_SPEC_KEYS))
     )
 
 
 def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
-    """Return an axis from its entry in a study."""
+    """Return the `Axis` that an entry of a study's ``axes`` defines."""
     if isinstance(spec, list):
         values = spec
     elif not isinstance(spec, dict):
@@ -92,7 +92,7 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
 
 
 def axis_value_label(value: Any) -> Any:
-    """Return what a study calls a value of an axis: a flag and a list are texts."""
+    """Return an axis value's label: a number as it is, a fraction as a float, else text."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, str) and len(value) < _LONGEST_FRACTION and _FRACTION.fullmatch(value):
@@ -221,19 +221,19 @@ def _range_values(spec: Mapping[str, Any]) -> list[Any]:
         step = (high - low) / (count - 1) if count > 1 else Fraction(0)
     _refuse_too_many(count)
     if not log:
-        return [scene_number(low + k * step) for k in range(count)]
+        return [to_scene_number(low + k * step) for k in range(count)]
     if low <= 0:
         raise ValueError("a logarithmic range must start above 0")
     if count == 1:
-        return [scene_number(low)]
+        return [to_scene_number(low)]
     growth = math.log(high / low) / (count - 1)
     # Six digits: rates stay short fractions, so that clocks have a common tick.
     inner = [float(f"{float(low) * math.exp(growth * k):.6g}") for k in range(1, count - 1)]
-    return [scene_number(low), *inner, scene_number(high)]
+    return [to_scene_number(low), *inner, to_scene_number(high)]
 
 
 def _phase_offsets(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
-    """Return offsets over the whole beat period of two clocks, in equal steps."""
+    """Return clock offsets, s, in equal steps over the time until two clocks are in step again."""
     parts = key.split(".")
     other = str(spec["beat_with"])
     if len(parts) != 3 or parts[0] != "blocks" or parts[2] != "offset_s":
@@ -254,11 +254,11 @@ def _phase_offsets(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]
     if isinstance(steps, bool) or not isinstance(steps, int) or steps < 1:
         raise ValueError("steps is how many phases: a whole number of 1 or more")
     _refuse_too_many(steps)
-    return [scene_number(beat_period_s(*periods) * k / steps) for k in range(steps)]
+    return [to_scene_number(beat_period_s(*periods) * k / steps) for k in range(steps)]
 
 
 def beat_period_s(first: Fraction, second: Fraction) -> Fraction:
-    """Return the time after which two periods are in step again: their least common multiple."""
+    """Return when two clocks are in step again, s: the least common multiple of their periods."""
     return Fraction(
         math.lcm(first.numerator, second.numerator),
         math.gcd(first.denominator, second.denominator),

@@ -28,7 +28,7 @@ from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import sealable_parquet
 from dsa_des.record.failure_counts import FailureCounts, add_counts
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.replicas.lock_step_size import FEW, MOST_BYTES, RunSize, are_few
+from dsa_des.replicas.lock_step_size import FEW, MOST_BYTES, RunSize, surely_fit_in_memory
 from dsa_des.replicas.replicas import Failed, Recorded, failure_counts_of_runs, run_replicas
 from dsa_des.results.folder import failure_counts_of_part
 from dsa_des.results.record import (
@@ -36,12 +36,16 @@ from dsa_des.results.record import (
     DONE,
     FAILED,
     STANDS_FOR,
-    columns_of,
     draw_column,
+    part_schema,
 )
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.allocation import Allocation
-from dsa_des.studies.foreseen import choose_runs, geometry_of, predict_results_and_errors
+from dsa_des.studies.foreseen_runs import (
+    geometry_names,
+    predict_results_and_errors,
+    sample_flown_runs,
+)
 from dsa_des.studies.metric import Group, Metric, measure_one_by_one, missing_values, needed_columns
 from dsa_des.studies.splitting import Nearness, SplitEvent, run_split
 from dsa_des.studies.study import Chunk, Study, format_set_value
@@ -55,7 +59,7 @@ _OBJECTS_AT_ONCE = 50_000
 
 @dataclass(frozen=True)
 class ChunkResult:
-    """The result of a chunk: the bytes of its part, until they are written, and its runs.
+    """Name and counts of a chunk's runs, and the bytes of its part file until they are written.
 
     `failed` of them gave no result, and of those `crashed` because their process died.
     """
@@ -69,33 +73,33 @@ class ChunkResult:
     cpu_s: float = 0.0
 
 
-def schema_of(study: Study) -> pa.Schema:
-    """Return the columns of a study's parts."""
+def study_part_schema(study: Study) -> pa.Schema:
+    """Return the Arrow schema of a study's part files."""
     scene = study.scene(0)
     metrics = [spec.build(scene) for spec in study.metrics]
-    return columns_of(
+    return part_schema(
         [(axis.column, axis.numeric) for axis in study.axes],
         [(draw_column(draw.key), draw.numeric) for draw in study.draws],
         [result for metric in metrics for result in metric.results()],
-        geometry_of(metrics) if study.allocate else (),
+        geometry_names(metrics) if study.allocate else (),
     )
 
 
 def run_chunk(study: Study, chunk: Chunk) -> ChunkResult:
-    """Run a chunk; a run that fails is a row with its error and the command that repeats it."""
+    """Run a chunk and return its result; a failed run's row holds its error and repeat command."""
     (done,) = run_chunks(study, [chunk])
     return done
 
 
 def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
-    """Run chunks of one round together, each as it would be by itself."""
+    """Run chunks of one round together and return their results, the same as if run alone."""
     with _delay_garbage_collection():
         return _run_chunks(study, chunks)
 
 
 @contextmanager
 def _delay_garbage_collection() -> Iterator[None]:
-    """Look for garbage seldom: what a lock step makes is there to its end."""
+    """Make garbage collection rare in the block, as a lock step's objects live to its end."""
     usual = gc.get_threshold()
     gc.set_threshold(max(usual[0], _OBJECTS_AT_ONCE) if usual[0] else 0, *usual[1:])
     try:
@@ -106,7 +110,7 @@ def _delay_garbage_collection() -> Iterator[None]:
 
 def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     began_s = time.process_time()
-    schema = schema_of(study)
+    schema = study_part_schema(study)
     tables: list[list[pa.Table]] = [[] for _ in chunks]
     failure_counts: list[list[FailureCounts]] = [[] for _ in chunks]
     pieces = [
@@ -133,12 +137,12 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
     return [replace(one, cpu_s=each_s * one.runs) for one in done]
 
 
-def crashed_run(study: Study, chunk: Chunk, tries: int) -> ChunkResult:
-    """Return the rows of runs whose process died every time."""
-    schema = schema_of(study)
+def crashed_chunk_result(study: Study, chunk: Chunk, tries: int) -> ChunkResult:
+    """Return the result of a chunk whose process always died: a row with this error per run."""
+    schema = study_part_schema(study)
     tables = []
     for cell, start, end in chunk.runs:
-        rows = _leading_columns(study, cell, range(start, end))
+        rows = _run_identity_columns(study, cell, range(start, end))
         rows["error"] = [f"the process that ran it died, {tries} times"] * (end - start)
         rows["status"] = [CRASHED] * (end - start)
         tables.append(_chunk_table(study, schema, cell, rows, {}))
@@ -146,7 +150,7 @@ def crashed_run(study: Study, chunk: Chunk, tries: int) -> ChunkResult:
 
 
 def make_chunk_result(name: str, table: pa.Table, counts: FailureCounts) -> ChunkResult:
-    """Return rows as the result of a chunk, with what blocks could not do in these runs."""
+    """Return a chunk's result from the table of its rows and its blocks' failure counts."""
     table = table.combine_chunks()
     status = table["status"].to_pylist()
     failed = len(status) - status.count(DONE)
@@ -157,7 +161,7 @@ def make_chunk_result(name: str, table: pa.Table, counts: FailureCounts) -> Chun
 
 
 def join_pieces(name: str, parts: Sequence[ChunkResult]) -> ChunkResult:
-    """Return pieces of a chunk as one, in order of cell and replica."""
+    """Return the results of parts of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
     failure_counts = add_counts(map(failure_counts_of_part, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
@@ -167,7 +171,7 @@ def join_pieces(name: str, parts: Sequence[ChunkResult]) -> ChunkResult:
     return replace(done, cpu_s=sum(part.cpu_s for part in parts))
 
 
-def _leading_columns(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
+def _run_identity_columns(study: Study, cell: int, numbers: Sequence[int]) -> dict[str, list[Any]]:
     replicas = [study.replica(number, cell) for number in numbers]
     rows: dict[str, list[Any]] = {
         "cell": [cell] * len(numbers),
@@ -220,11 +224,11 @@ def _run_cell(
     of: IntArray,
     failure_counts: Sequence[list[FailureCounts]],
 ) -> pa.Table:
-    """Return the rows of some replicas of a cell, of which those that a plan chooses are flown.
+    """Run a cell's replicas, or those that a plan draws; return a table with a row for each.
 
     What blocks could not do is put to `failure_counts` of the chunk that each replica is `of`.
     """
-    rows = _leading_columns(study, cell, numbers)
+    rows = _run_identity_columns(study, cell, numbers)
     try:
         scene = study.scene(cell)
         metrics = [spec.build(scene) for spec in study.metrics]
@@ -246,7 +250,9 @@ def _run_cell(
             )  # that of the pilot is lost
             if len(runs) >= _MANY_RUNS:  # those of the stage before
                 gc.collect()
-            return _fly_replicas(scene, [nearness], runs, wrong, key, chunk_of[number], said), wrong
+            return _run_and_measure_replicas(
+                scene, [nearness], runs, wrong, key, chunk_of[number], said
+            ), wrong
 
         rows["error"], values = run_split(
             study.splitting, metrics[0], numbers, lambda number: study.repetition(number, cell),
@@ -255,17 +261,19 @@ def _run_cell(
         )  # fmt: skip
         return _chunk_table(study, schema, cell, rows, values)
     if not study.allocate:
-        values = _fly_replicas(scene, metrics, replicas, rows["error"], key, of, failure_counts)
+        values = _run_and_measure_replicas(
+            scene, metrics, replicas, rows["error"], key, of, failure_counts
+        )
         return _chunk_table(study, schema, cell, rows, values)
     known, errors = predict_results_and_errors(scene, metrics, replicas)
     for k, text in errors.items():
         rows["error"][k] = text
     results = [result for metric in metrics for result in metric.results()]
-    shares, predicted = choose_runs(study, cell, numbers, plan, results, known)
+    shares, predicted = sample_flown_runs(study, cell, numbers, plan, results, known)
     these = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
     wrong: list[str | None] = [None] * len(these)
     some = [replicas[k] for k in these]
-    flown = _fly_replicas(scene, metrics, some, wrong, key, of[these], failure_counts)
+    flown = _run_and_measure_replicas(scene, metrics, some, wrong, key, of[these], failure_counts)
     for k, said in zip(these, wrong, strict=True):
         rows["error"][k] = said
     values = {}
@@ -277,7 +285,7 @@ def _run_cell(
     )
 
 
-def _fly_replicas(
+def _run_and_measure_replicas(
     scene: Scene,
     metrics: Sequence[Metric],
     replicas: Sequence[Replica],
@@ -286,7 +294,7 @@ def _fly_replicas(
     of: IntArray,
     failure_counts: Sequence[list[FailureCounts]],
 ) -> dict[str, AnyArray]:
-    """Run replicas and return result → values.
+    """Run replicas, compute the metrics of each, and return result → values over the replicas.
 
     What went wrong is put among `errors`, what blocks could not do to its chunk's counts.
     """
@@ -294,13 +302,13 @@ def _fly_replicas(
     done, wanted = 0, needed_columns(metrics)
     if len(_size_of_a_run) > _MOST_KNOWN:
         _size_of_a_run.clear()
-    if key not in _size_of_a_run and not are_few(scene, len(replicas)):
-        _size_of_a_run[key] = _likely_size(scene, replicas[0], wanted)
+    if key not in _size_of_a_run and not surely_fit_in_memory(scene, len(replicas)):
+        _size_of_a_run[key] = _expected_run_size(scene, replicas[0], wanted)
     while done < len(replicas):
         # What runs together is measured together: of what blocks make for a batch nothing is made
         # again for the metrics, however many runs the chunk holds.
         size = _size_of_a_run.get(key)
-        most = len(replicas) if size is None else size.most
+        most = len(replicas) if size is None else size.largest_run_count
         left = len(replicas) - done
         many = math.ceil(left / math.ceil(left / most))
         part = replicas[done : done + many]
@@ -312,7 +320,7 @@ def _fly_replicas(
             failure_counts[chunk].append(failure_counts_of_runs(outcomes[k] for k in mine))
         recorded = [outcome for outcome in outcomes if isinstance(outcome, Recorded)]
         if recorded and size is not None:
-            each = sum(map(_bytes_of, recorded)) / len(recorded)
+            each = sum(map(_recorded_bytes, recorded)) / len(recorded)
             _size_of_a_run[key] = replace(size, recorded=each)
         good = [k for k, outcome in enumerate(outcomes) if isinstance(outcome, Recorded)]
         for k, outcome in enumerate(outcomes):
@@ -329,10 +337,10 @@ def _fly_replicas(
     return values
 
 
-def _likely_size(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> RunSize:
-    """Return what a run holds, before any has run: few runs to begin with would cost much."""
+def _expected_run_size(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> RunSize:
+    """Return a run's likely memory size before any ran, so lock steps need not start small."""
     try:
-        return RunSize.of(replica_scene(scene, replica), wanted)
+        return RunSize.estimate(replica_scene(scene, replica), wanted)
     except (SceneError, BlockFailure):  # its row says why
         return RunSize(MOST_BYTES / FEW)
 
@@ -342,7 +350,7 @@ _MOST_KNOWN = 1000
 _size_of_a_run: dict[tuple[str, int], RunSize] = {}
 
 
-def _bytes_of(run: Recorded) -> int:
+def _recorded_bytes(run: Recorded) -> int:
     columns = [column for table in run.tables.values() for column in table.values()]
     return sum(c.codes.nbytes if isinstance(c, Text) else c.nbytes for c in columns)
 
@@ -350,7 +358,7 @@ def _bytes_of(run: Recorded) -> int:
 def _run_or_fail(
     scene: Scene, replicas: Sequence[Replica], wanted: Mapping[str, Any]
 ) -> list[Recorded | Failed]:
-    """Run replicas; whatever one of them raises, memory that is short included, is its error."""
+    """Run replicas and return their records or `Failed`; after an error all run one by one."""
     try:
         return run_replicas(scene, replicas, wanted=wanted, most=len(replicas))
     except (Exception, SystemExit) as error:  # a block that wants to leave does not end the study
@@ -362,7 +370,7 @@ def _run_or_fail(
 def _measure_metrics(
     scene: Scene, metrics: Sequence[Metric], runs: Sequence[tuple[Replica, Any]]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
-    """Return result → values over the runs, and the error of every run that gave none."""
+    """Return result → values over the runs, and run index → error for the runs without values."""
     if not runs:
         return {}, {}
     group = Group(

@@ -31,7 +31,7 @@ KINDS = ("uniform", "normal", "choice", "latin_hypercube", "sequence")
 
 @dataclass(frozen=True)
 class Draw:
-    """How one value of the scene is drawn."""
+    """How the value of one scene key is chosen for each replica, at random or in sequence."""
 
     #: Dotted key of the scene.
     key: str
@@ -44,11 +44,11 @@ class Draw:
 
     @property
     def numeric(self) -> bool:
-        """Whether all that may be drawn are numbers."""
+        """Whether all values that may be drawn are numbers."""
         return all(isinstance(value, int | float) for value in self.values)
 
     def value(self, seed: int, replica: int, batch: int) -> Any:
-        """Return the value of one replica.
+        """Return the value drawn for one replica.
 
         `seed` is the study's, or that of a member of its sample; a Latin hypercube covers `batch`
         consecutive replicas together.
@@ -64,12 +64,14 @@ class Draw:
             return self.values[min(int(u * len(self.values)), len(self.values) - 1)]
         low, high = self.values
         if self.kind == "normal":
-            return exact_clock_value(self.key, low + high * NormalDist().inv_cdf(max(u, 2.0**-54)))
-        return exact_clock_value(self.key, low + (high - low) * u)
+            return round_for_exact_clock(
+                self.key, low + high * NormalDist().inv_cdf(max(u, 2.0**-54))
+            )
+        return round_for_exact_clock(self.key, low + (high - low) * u)
 
 
-def exact_clock_value(key: str, value: float) -> float | Fraction:
-    """Return a drawn value so that clocks stay exact: whole nanoseconds, whole millihertz."""
+def round_for_exact_clock(key: str, value: float) -> float | Fraction:
+    """Return a drawn time (s) or frequency (Hz) as a fraction, to ns or mHz; others unchanged."""
     for ending, unit in (("_s", 10**9), ("_hz", 1000)):
         if key.endswith(ending) and not key.endswith("deg_s"):
             return Fraction(round(value * unit), unit)
@@ -77,12 +79,12 @@ def exact_clock_value(key: str, value: float) -> float | Fraction:
 
 
 def replica_seed(seed: int, replica: int) -> int:
-    """Return the seed of one replica's run, the same in every cell of one seed."""
+    """Return the seed of a replica's run, the same in every cell with the study's seed."""
     return key_of(seed, "study replica", replica) >> 1
 
 
 def uniform_of_replica(seed: int, key: str, replica: int) -> float:
-    """Return a number from [0, 1) for a replica, by a seed and what it is drawn for."""
+    """Return a uniform number in [0, 1) that depends on the seed, the key and the replica only."""
     return (key_of(seed, "study draw", key, replica) >> 11) * 2.0**-53
 
 
@@ -93,7 +95,7 @@ def _shuffled_strata(seed: int, key: str, block: int, batch: int) -> IntArray:
 
 
 def flatten_draws(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Return dotted key → how it is drawn; nested tables are keys of the scene."""
+    """Return dotted key → definition of the draw, for all draws in nested tables."""
 
     def is_draw(value: Any) -> bool:
         return (
@@ -106,7 +108,7 @@ def flatten_draws(tables: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parse_draw(key: str, table: Any) -> Draw:
-    """Return a draw from its table in a study, for example ``{uniform = [0, 0.2]}``."""
+    """Return the `Draw` that a table of a study defines, for example ``{uniform = [0, 0.2]}``."""
     form = "must be one of {uniform = [low, high]}, {normal = [mean, standard deviation]}, " \
         "{choice = [...]}, {latin_hypercube = [low, high]}, {sequence = [first, step]}"  # fmt: skip
     if not isinstance(table, dict) or len(table) != 1:
@@ -144,10 +146,10 @@ def parse_draw(key: str, table: Any) -> Draw:
 
 
 def _check_size(key: str, kind: str, low: float, high: float) -> None:
-    """Refuse a range that numbers cannot span."""
+    """Raise ValueError for a range whose ends are too large for floating-point numbers."""
     try:
         spans = math.isfinite(high - low)
-        exact_clock_value(key, low), exact_clock_value(key, high)
+        round_for_exact_clock(key, low), round_for_exact_clock(key, high)
     except (OverflowError, ValueError):
         spans = False
     if not spans:
@@ -169,7 +171,7 @@ def _two_numbers(kind: str, values: Any) -> tuple[float, float]:
 
 
 def member_seed(seed: int, members: Iterable[tuple[Axis, int]]) -> int:
-    """Return the seed of all runs of one member of a sample.
+    """Return the seed of all runs of one member (combination of values) of a sample.
 
     It depends on the values alone: not on their places, nor on what other values there are.
 
@@ -183,7 +185,7 @@ def member_seed(seed: int, members: Iterable[tuple[Axis, int]]) -> int:
 
 
 def axis_value_identity(axis: Axis, index: int) -> tuple[str, ...]:
-    """Return what tells one value of an axis from all others.
+    """Return texts that identify an axis value: a file's name and content hash, or its label.
 
     A file is known by its name, without its folder, and its content: it keeps its draws wherever
     it lies, copies under other names are other encounters, and so are files of the same name in
@@ -200,7 +202,7 @@ def axis_value_identity(axis: Axis, index: int) -> tuple[str, ...]:
 
 
 def file_digest(path: Path) -> str:
-    """Return the SHA-256 of a file's content; a file that stays as it is is read once."""
+    """Return the SHA-256 of a file's content; a file that has not changed is read only once."""
     state = path.stat()
     return _digest(str(path), state.st_mtime_ns, state.st_size, state.st_ino)
 

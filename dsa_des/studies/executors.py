@@ -21,10 +21,10 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import is_ours
+from dsa_des.block.shadowed_packages import is_ours
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import Parts
-from dsa_des.studies.attempts import Attempts, Piece, run_together
+from dsa_des.studies.attempts import Attempts, Piece, group_chunks
 from dsa_des.studies.chunk import ChunkResult, run_chunks
 from dsa_des.studies.study import Chunk, Study
 
@@ -37,7 +37,7 @@ _HOME = str(Path(__file__).parents[2])
 
 
 class Executor(Protocol):
-    """Something that runs chunks."""
+    """Interface of what runs chunks: in this process, in worker processes or on a cluster."""
 
     def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks, have their parts written, and give what each came to when it is there.
@@ -50,8 +50,10 @@ class Executor(Protocol):
 
 
 def run_and_write(study: Study, parts: Parts, chunks: Sequence[Chunk]) -> list[ChunkResult]:
-    """Run chunks together and write the parts of those that are whole; only others keep rows."""
-    parts.check()
+    """Run chunks together, write the part files of whole chunks and return all results; only
+    unwritten ones keep their bytes.
+    """
+    parts.check_same_study()
     result = run_chunks(study, chunks)
     for k, chunk in enumerate(chunks):
         if chunk.whole:
@@ -65,7 +67,7 @@ class Serial:
 
     def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks in their order."""
-        for some in run_together(study, list(chunks), 1):
+        for some in group_chunks(study, list(chunks), 1):
             yield from run_and_write(study, parts, some)
 
     def close(self) -> None:
@@ -85,7 +87,7 @@ class Local:
 
     def run(self, study: Study, parts: Parts, chunks: Iterable[Chunk]) -> Iterator[ChunkResult]:
         """Run all chunks; two pieces per worker are under way at a time."""
-        attempts = Attempts(study, run_together(study, list(chunks), self._count))
+        attempts = Attempts(study, group_chunks(study, list(chunks), self._count))
         if not self._workers or any(w.study is not study or len(w) for w in self._workers):
             self.close()
             self._workers = [_Worker(study) for _ in range(self._count)]
@@ -109,7 +111,7 @@ class Local:
 
 
 class _Worker:
-    """One process, and the pieces it was given, in order."""
+    """One worker process and the pieces submitted to it, in order."""
 
     def __init__(self, study: Study) -> None:
         self.study = study
@@ -120,11 +122,11 @@ class _Worker:
         return len(self._given)
 
     def futures(self) -> list["Future[list[ChunkResult]]"]:
-        """What is under way."""
+        """Return the futures of all pieces submitted and not yet removed."""
         return [future for future, _ in self._given]
 
     def submit(self, piece: Piece, parts: Parts) -> None:
-        """Run a piece after those that were given before."""
+        """Submit a piece to the process, to run after those submitted before."""
         try:
             with safe_import_path():
                 if self._pool is None:
@@ -135,12 +137,12 @@ class _Worker:
             future.set_exception(error)
         self._given.append((future, piece))
 
-    def pop(self) -> "tuple[Future[list[ChunkResult]], Piece] | None":
-        """Return the first piece if it is finished or lost."""
+    def pop_if_done(self) -> "tuple[Future[list[ChunkResult]], Piece] | None":
+        """Pop the front future and piece if it is finished or its process died; else None."""
         return self._given.popleft() if self._given and self._given[0][0].done() else None
 
-    def renew(self) -> list[Piece]:
-        """Give up a process that died; return what it never came to."""
+    def take_unfinished_pieces(self) -> list[Piece]:
+        """Stop a process that died, and return the pieces that it did not finish."""
         left = [piece for _, piece in self._given]
         self._given.clear()
         self.stop()
@@ -157,20 +159,20 @@ class _Worker:
 
 
 def _finished_pieces(worker: _Worker, attempts: Attempts) -> Iterator[ChunkResult]:
-    while (first := worker.pop()) is not None:
+    while (first := worker.pop_if_done()) is not None:
         future, piece = first
         try:
-            done = attempts.finish(piece, future.result())
+            done = attempts.take_results(piece, future.result())
         except BrokenProcessPool:
-            for other in worker.renew():
-                attempts.give_back(other)
-            done = attempts.take_back(piece)
+            for other in worker.take_unfinished_pieces():
+                attempts.requeue_piece(other)
+            done = attempts.retry_after_crash(piece)
         yield from done
 
 
 @contextmanager
 def safe_import_path() -> Iterator[None]:
-    """Let nothing of the working directory, or beside a script, stand in for another module.
+    """Inside the block, keep modules in the working or script folder from hiding others.
 
     Python puts the working directory first on the module path of each process that it starts with
     ``-c``: of workers, of the server that forks them, and of the tracker of what they share. Then
@@ -194,7 +196,7 @@ def safe_import_path() -> Iterator[None]:
 
 
 def _script_folder_last(path: list[str]) -> list[str]:
-    """Return a module path without the working directory, and a script's folder last.
+    """Return a search path without the working directory and with the script's folder last.
 
     The folder that we were imported from stays, whichever it is.
     """
@@ -210,12 +212,12 @@ def _new_pool(study: Study) -> ProcessPoolExecutor:
     method = "forkserver" if "forkserver" in methods else "spawn"
     context = multiprocessing.get_context(method)
     if method == "forkserver":  # what all workers need is imported once
-        context.set_forkserver_preload(["dsa_des.studies.executors", *_our_modules(study)])
+        context.set_forkserver_preload(["dsa_des.studies.executors", *_own_block_modules(study)])
     return ProcessPoolExecutor(1, mp_context=context, initializer=_start_worker, initargs=(study,))
 
 
-def _our_modules(study: Study) -> list[str]:
-    """Return the modules of a study's blocks that belong to this program."""
+def _own_block_modules(study: Study) -> list[str]:
+    """Return the names of those modules of a study's blocks that belong to this program."""
     ours = {
         point.module.partition(".")[0] for point in entry_points_of().values() if is_ours(point)
     }
@@ -228,7 +230,7 @@ _studied: list[Study] = []
 
 
 def _start_worker(study: Study) -> None:
-    """Leave ctrl-C to the parent, and do not outlive it."""
+    """Prepare a worker process: store its study, ignore ctrl-C, end with the parent process."""
     _studied[:] = [study]
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     parent = multiprocessing.parent_process()
@@ -289,7 +291,7 @@ class Dask:
         from distributed.scheduler import KilledWorker
 
         workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
-        attempts = Attempts(study, run_together(study, list(chunks), max(1, workers)))
+        attempts = Attempts(study, group_chunks(study, list(chunks), max(1, workers)))
         given: dict[Any, Piece] = {}
         running = as_completed(loop=self._client.loop)
         most = max(8, 4 * workers)
@@ -306,9 +308,9 @@ class Dask:
         for future in running:
             piece = given.pop(future.key)
             try:
-                done = attempts.finish(piece, future.result())
+                done = attempts.take_results(piece, future.result())
             except KilledWorker:
-                done = attempts.take_back(piece)
+                done = attempts.retry_after_crash(piece)
             submit()
             yield from done
             if not given:
@@ -320,7 +322,7 @@ class Dask:
 
 
 def make_executor(kind: str, workers: int, scheduler: str | None) -> Executor:
-    """Return the executor that a command line asks for."""
+    """Return the executor that command-line options choose: serial, local processes or Dask."""
     if kind == "dask":
         if scheduler is None:
             raise UsageError(

@@ -15,9 +15,9 @@ import numpy as np
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign import NotImportable, load_named, load_point
 from dsa_des.block.message import Columns, Text
 from dsa_des.block.registry import ClassText
+from dsa_des.block.shadowed_packages import NotImportable, load_entry_point, load_named
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import ReplicaScenes, replica_scenes
@@ -68,7 +68,7 @@ _T = TypeVar("_T")
 
 
 class Group:
-    """What replicas of one scene recorded, table by table.
+    """Replicas of one scene and their recorded tables, from which metrics are computed.
 
     Parameters
     ----------
@@ -104,7 +104,7 @@ class Group:
         return len(self.replicas)
 
     def cached(self, key: Any, make: Callable[[], _T]) -> _T:
-        """Return what `make` returns, made once per group and key: metrics may share work."""
+        """Return the result of `make`, called once per group and key for metrics to share."""
         if key not in self._known:
             self._known[key] = make()
         result: _T = self._known[key]
@@ -112,11 +112,11 @@ class Group:
 
     @cached_property
     def scenes(self) -> Sequence[Scene]:
-        """The scene of every replica with its changes."""
+        """The scene of each replica, with that replica's changes applied."""
         return replica_scenes(self.scene, self.replicas)
 
     def parameters_of(self, block: str) -> Sequence[Any]:
-        """Return a block's parameters in every replica."""
+        """Return a block's parameters in every replica, one entry per replica."""
 
         def parameters() -> Sequence[Any]:
             if isinstance(self.scenes, ReplicaScenes):
@@ -142,7 +142,7 @@ def _concatenate_columns(table: str, columns: Any, recorded: Sequence[Recorded])
 
 
 def _recorded_parts(table: str, recorded: Sequence[Recorded]) -> Iterator[Columns]:
-    """Return what was recorded in one table, with ``replica``: of a whole lock step at once."""
+    """Yield one table's recorded columns and ``replica``, by single runs or whole lock steps."""
     start = 0
     while start < len(recorded):
         shared = recorded[start].shared
@@ -181,7 +181,8 @@ def _join_texts(pieces: Sequence[Text]) -> Text:
 
 
 class Metric:
-    """Something that is measured of every run of a study. Subclass it and register the subclass.
+    """Base class of what is measured of every run of a study. Subclass it and register the
+    subclass.
 
     Parameters
     ----------
@@ -212,7 +213,7 @@ class Metric:
         self.scene = scene
 
     def results(self) -> list[Result]:
-        """Return the columns this metric gives."""
+        """Return the result columns that this metric produces."""
         raise NotImplementedError
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
@@ -223,20 +224,20 @@ class Metric:
         raise NotImplementedError
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return what is known of every replica without running it: results, and `geometry`.
+        """Return result or geometry name → values known of every replica without running it.
 
         The group has recorded nothing. Results are those that `measure` would give, to the bit.
         """
         raise NotImplementedError
 
     def scored_events(self) -> Sequence[str]:
-        """Return the events of which it knows how near a run comes (`reached_s`)."""
+        """Return the names of the events for which `reached_s` tells how near a run comes."""
         return ()
 
     def reached_s(
         self, group: Group, event: str, score: str, levels: Sequence[float]
     ) -> FloatArray:
-        """Return when each replica first reached levels of a score, s, (levels, replicas).
+        """Return when each replica first reached each level of a score, s, (levels, replicas).
 
         NaN where it never did. Levels fall, the last one of `scores` is the event itself, and what
         is reached by an instant depends on nothing later.
@@ -244,27 +245,27 @@ class Metric:
         raise NotImplementedError
 
     def unit_weights(self, group: Group) -> FloatArray:
-        """Return how often each replica's encounter happens, (replicas,)."""
+        """Return the weight of each replica, (replicas,): how often its encounter happens."""
         return np.ones(len(group))
 
     def check(self, blocks: Mapping[str, Component]) -> None:
-        """Raise ValueError for what is wrong and only blocks that are set up can tell.
+        """Raise ValueError for faults that show only once the blocks are set up.
 
         Called before a study runs, never during it.
         """
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
-        """Return the analytic answer for a scene, for results that have one."""
+        """Return result → analytic answer for a scene, for those results that have one."""
         return {}
 
 
 def expected_column(event: str) -> str:
-    """Return the name in `Metric.geometry` of the chance that is expected of an event."""
+    """Return ``expected.EVENT``, the name in `Metric.geometry` of an event's expected chance."""
     return f"expected.{event}"
 
 
 def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
-    """Return a registered metric, or that of ``module:Class`` or ``./file.py:Class``."""
+    """Return the metric class of a name, or of ``module:Class`` or ``./file.py:Class``."""
     if isinstance(name, ClassText):
         return _require_metric(name, name.cls)
     point = entry_points_of(METRICS).get(name)
@@ -273,7 +274,9 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
         raise ValueError(f"unknown metric{hint} (or module:Class)")
     try:
         result = (
-            load_named(name, "metrics", beside) if point is None else load_point(point, "metrics")
+            load_named(name, "metrics", beside)
+            if point is None
+            else load_entry_point(point, "metrics")
         )
     except NotImportable as error:
         raise ValueError(str(error)) from error.__cause__
@@ -288,11 +291,13 @@ def _require_metric(name: str, result: Any) -> type[Metric]:
 
 def blocks_recording(scene: Scene, table: str) -> list[str]:
     """Return the blocks of a scene that can record rows of a table, sorted by name."""
-    return [name for name, cls in sorted(scene.classes.items()) if table in _tables_of(cls)]
+    return [
+        name for name, cls in sorted(scene.classes.items()) if table in _tables_recorded_by(cls)
+    ]
 
 
-def _tables_of(cls: type[Component]) -> set[str]:
-    """Return the tables that a block's outputs record, and those that it may record besides."""
+def _tables_recorded_by(cls: type[Component]) -> set[str]:
+    """Return the names of the tables that a block class records or may record."""
     messages = [*(output.message for output in cls.outputs.values()), *cls.also_records]
     return {table for message in messages for table in message.recorded}
 
@@ -301,7 +306,7 @@ def check_tables(metric: type[Metric], scene: Scene) -> None:
     """Raise ValueError unless some block of the scene records each table the metric reads."""
     for table in metric.tables:
         if not blocks_recording(scene, table):
-            known = set().union(*(_tables_of(cls) for cls in scene.classes.values()))
+            known = set().union(*(_tables_recorded_by(cls) for cls in scene.classes.values()))
             raise ValueError(
                 f"needs a block whose output records {table!r}; this scene's blocks record "
                 f"{', '.join(sorted(known)) or 'nothing'}"
@@ -327,7 +332,7 @@ def check_recorded(metric: Metric, blocks: Mapping[str, Component]) -> None:
 
 
 def needed_columns(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
-    """Return which columns of which tables metrics need, sorted; ``tick`` always."""
+    """Return table → sorted columns that the metrics need, always including ``tick``."""
     wanted: dict[str, set[str]] = {}
     for metric in metrics:
         for table, columns in metric.tables.items():
@@ -336,7 +341,7 @@ def needed_columns(metrics: Sequence[Metric]) -> dict[str, tuple[str, ...]]:
 
 
 def missing_values(count: int, *, text: bool) -> AnyArray:
-    """Return as many missing values."""
+    """Return an array of `count` missing values: None for texts, NaN for numbers."""
     return np.full(count, None, dtype=object) if text else np.full(count, np.nan)
 
 
@@ -344,7 +349,7 @@ def measure_one_by_one(
     measure: Callable[[Sequence[Any]], tuple[dict[str, AnyArray], dict[int, str]]],
     runs: Sequence[Any],
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
-    """Measure each run by itself, so that one that breaks a metric leaves the others alone."""
+    """Measure each run alone, in case one fails; return the values, and run index → error."""
     result: dict[str, AnyArray] = {}
     errors: dict[int, str] = {}
     for k, run in enumerate(runs):

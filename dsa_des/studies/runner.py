@@ -19,14 +19,14 @@ from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
 from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
 from dsa_des.studies.executors import Executor
-from dsa_des.studies.foreseen import allocations_of_round
-from dsa_des.studies.identity import record_of, results_of, write_explained
+from dsa_des.studies.foreseen_runs import allocations_of_round
 from dsa_des.studies.study import Chunk, Study
+from dsa_des.studies.study_digest import record_of, results_of, write_explained
 
 
 @dataclass
 class Progress:
-    """How far a study is."""
+    """How many runs of a study there are, and how many are done, failed or crashed."""
 
     runs: int = 0
     #: Without result; of these `crashed` because their process died.
@@ -40,7 +40,7 @@ class Stopped(Exception):
 
 
 def study_lock_step_refusal(study: Study) -> str | None:
-    """Return why replicas of the first or the last cell cannot run in lock step, if so."""
+    """Return why the first or last cell's replicas cannot run in lock step; None if they can."""
     if study.replicas < 2:
         return None
     for cell in sorted({0, len(study.cells) - 1}):
@@ -60,7 +60,7 @@ def run_study(
     executor: Executor,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Run what is missing of a study into its open folder; `report` is called after every chunk."""
+    """Run all that a study's open folder lacks, `report` per chunk, and return the counts."""
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(study.cells)
     starts = [0, *study.round_ends[:-1]]
@@ -79,7 +79,7 @@ def run_study(
             plans = allocations_of_round(study, folder, number, first, cells)
             chunks = list(study.chunks(number, cells, plans))
             _run_round(study, folder, executor, chunks, number, report, progress)
-        _remove_rounds(folder, len(starts))
+        _remove_rounds_from(folder, len(starts))
     except KeyboardInterrupt:
         raise Stopped("interrupted") from None
     return progress
@@ -94,7 +94,7 @@ def _run_round(
     report: Callable[[Progress], None],
     progress: Progress,
 ) -> None:
-    """Run what is missing of a round: parts that are not there, and runs that crashed."""
+    """Run what a round lacks: parts that are missing, and runs whose process crashed."""
     planned = {chunk.name for chunk in chunks}
     for name in folder.part_names():  # of a round that other cells took part in
         if _round_number(name) == number and name not in planned and folder.part(name) is not None:
@@ -119,10 +119,10 @@ def _run_round(
                 )
     report(progress)
     try:
-        for done in executor.run(study, folder.destination, missing):
+        for done in executor.run(study, folder.parts_destination, missing):
             whole = join_pieces(done.name, [kept[done.name], done]) if done.name in kept else done
             if whole.content:
-                folder.destination.write(whole.name, whole.content)
+                folder.parts_destination.write(whole.name, whole.content)
             progress.runs += done.runs
             progress.failed += done.failed
             progress.crashed += done.crashed
@@ -135,8 +135,8 @@ def _round_number(name: str) -> int:
     return int(name.split("-")[1])
 
 
-def _remove_rounds(folder: StudyFolder, first: int) -> None:
-    """Remove parts of this study that belong to rounds it no longer has."""
+def _remove_rounds_from(folder: StudyFolder, first: int) -> None:
+    """Remove the study's parts of round `first` and of all later rounds."""
     for name in folder.part_names():
         if _round_number(name) >= first and folder.part(name) is not None:
             folder.remove_part(name)
@@ -162,7 +162,7 @@ def _runs_in_rows(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
 
 
 def _satisfied_cells(study: Study, folder: StudyFolder, number: int) -> set[int]:
-    """Return the cells whose interval is narrow enough after the rounds before `number`."""
+    """Return the cells with a narrow enough confidence interval after rounds before `number`."""
     stop = study.stop_when
     assert stop is not None
     result = next(item for item in results_of(study) if item.name == stop.metric)
@@ -186,7 +186,7 @@ def tables_of(study: Study, folder: StudyFolder) -> Tables:
 
 
 def _expected_answers(study: Study) -> Expected:
-    """Return the analytic answers by axis values, averaged over draws and encounters."""
+    """Return (result, axis values) → analytic answer, averaged over draws and encounters."""
     sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
     many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
     for cell in study.cells:
@@ -226,7 +226,7 @@ def draw_run(study: Study, folder: StudyFolder, cell: int, replica: int) -> list
 
 
 class Clock:
-    """Rate and time left of a study that is running."""
+    """Measures the rate and the time left of a study that is running."""
 
     def __init__(self) -> None:
         self._started = time.monotonic()

@@ -15,13 +15,13 @@ from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.splitting import FlownRuns, Repeated, find_levels, run_repetitions
 from dsa_des.results.record import CLASS, EVENT, NUMBER, Result
-from dsa_des.scene.graph import cycle_numbers
+from dsa_des.scene.graph import loop_number_by_block
 from dsa_des.studies.metric import Group, Metric
 
 
 @dataclass(frozen=True)
 class Splitting:
-    """How the probability of an event is found by splitting.
+    """Settings for estimating the probability of an event by multilevel splitting.
 
     Levels are of the score and fall; without any a pilot finds them.
     """
@@ -35,21 +35,21 @@ class Splitting:
 
 
 class Nearness(Metric):
-    """When each run first reached levels of the score of an event, and how much it weighs."""
+    """The metric of when runs first reached levels of an event's score, with the run's weight."""
 
     def __init__(self, metric: Metric, event: str, score: str, levels: Sequence[float]) -> None:
         self._metric, self._asked = metric, (event, score, levels)
         self.tables = metric.tables
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the times, s, by the number of the level; NaN for never."""
+        """Return level number → times of reaching it, s, NaN for never; and ``weight``."""
         times_s = self._metric.reached_s(group, *self._asked)
         weights = self._metric.unit_weights(group)
         return {"weight": weights} | {str(k): one for k, one in enumerate(times_s)}
 
 
 class SplitEvent(Metric):
-    """What a repetition tells of an event, which a metric gives of a run."""
+    """The metric of a splitting repetition instead of a run: an event's probability."""
 
     def __init__(self, metric: Metric, event: str) -> None:
         super().__init__(metric.p, metric.scene)
@@ -57,7 +57,7 @@ class SplitEvent(Metric):
         self.tables = metric.tables
 
     def results(self) -> list[Result]:
-        """Return the probability, and how a repetition came to it."""
+        """Return a repetition's result columns: event probability, and how it was obtained."""
         of = {result.name: result.meaning for result in self.metric.results()}
         name = self.event
         return [
@@ -71,13 +71,13 @@ class SplitEvent(Metric):
         ]  # fmt: skip
 
     def nearness_to_levels(self, score: str, levels: Sequence[float]) -> Nearness:
-        """Return what tells when runs reach some levels of a score."""
+        """Return the metric of when runs reach the given levels of a score."""
         return Nearness(self.metric, self.event, score, levels)
 
     def results_of_repetitions(
         self, found: Sequence[Repeated], levels: Sequence[float]
     ) -> dict[str, AnyArray]:
-        """Return result → values of some repetitions; NaN and None of those that failed."""
+        """Return result → values of the repetitions; NaN or None for those that failed."""
         text = ", ".join(f"{level:.4g}" for level in levels[:-1]) or "none"
         values = {
             "": [one.probability for one in found],
@@ -91,7 +91,7 @@ class SplitEvent(Metric):
         } | {f"{self.event}.levels": np.array([None if f else text for f in failed], dtype=object)}
 
     def check(self, blocks: Mapping[str, Component]) -> None:
-        """Raise ValueError for what the metric itself finds wrong."""
+        """Raise ValueError for what the event's own metric finds wrong."""
         self.metric.check(blocks)
 
 
@@ -111,7 +111,7 @@ def run_split(
     *,
     known: str,
 ) -> tuple[list[str | None], dict[str, AnyArray]]:
-    """Return the error of each of some repetitions, or None, and what they came to.
+    """Run repetitions of splitting; return each one's error or None, and result → values.
 
     `repetition` gives the first runs of one and its seed, of the pilot those of -1, which is flown
     once for all that is `known` under one text.
@@ -143,7 +143,7 @@ _levels_found: dict[str, tuple[float, ...]] = {}
 def splitting_refusal(
     table: Splitting, split_event: SplitEvent, name: str
 ) -> tuple[str, str, Any] | None:
-    """Return which key of the table, why, and which value makes splitting impossible; or None.
+    """Return (key of the table, reason, value) for why splitting is impossible; else None.
 
     Asked before the first run.
     """
@@ -152,7 +152,7 @@ def splitting_refusal(
     if hosted:
         said = f"the block {hosted[0]} waits for a host program, and cannot be flown again"
         return "", said, None
-    if not cycle_numbers(scene.graph):
+    if not loop_number_by_block(scene.graph):
         return "", "the scene has no closed loop: nothing that is drawn changes a flight", None
     events, scores = metric.scored_events(), metric.scores
     if not events:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
-from dsa_des.block.registry import add_source
+from dsa_des.block.registry import with_source_folder
 from dsa_des.block.source_file import absolute_type_name
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.record import FigureRecord, Requirement, StopWhen
@@ -34,7 +34,7 @@ from dsa_des.time.randomness import key_of
 
 @dataclass(frozen=True)
 class MetricSpec:
-    """A metric as a study names it: its registered name and its own keys."""
+    """A metric as a study file gives it: its registered name and the values of its own keys."""
 
     name: str
     keys: Mapping[str, Any] = field(default_factory=dict)
@@ -44,7 +44,7 @@ class MetricSpec:
     splits: str = ""
 
     def build(self, scene: Scene) -> Metric:
-        """Return the metric for a scene."""
+        """Return the metric, built for a scene; ValueError if that fails."""
         cls = find_metric(self.name, (scene.path.parent,))
         try:
             with wrap_foreign_errors(ValueError):
@@ -61,7 +61,7 @@ AUTO = "auto"
 
 @dataclass(frozen=True)
 class Chunk:
-    """Some consecutive runs: for each cell, a range of replicas."""
+    """Some consecutive runs of a study: for each cell in it, a range of replicas."""
 
     name: str
     runs: tuple[tuple[int, int, int], ...]
@@ -75,7 +75,7 @@ class Chunk:
 
     @property
     def expected_flown(self) -> float:
-        """How many of the runs are flown, about."""
+        """Expected number of the chunk's runs that are flown."""
         return sum(
             (end - start) * (self.plans[cell].share if cell in self.plans else 1.0)
             for cell, start, end in self.runs
@@ -84,7 +84,7 @@ class Chunk:
 
 @dataclass
 class Study:
-    """A study that can be run."""
+    """A study that has been read and checked, so that it can be run."""
 
     path: Path
     scene_path: Path
@@ -124,46 +124,46 @@ class Study:
     repeat: str = ""
 
     @property
-    def _sizes(self) -> tuple[int, ...]:
+    def _axis_lengths(self) -> tuple[int, ...]:
         return tuple(len(axis.labels) for axis in self.axes)
 
     @property
     def cells(self) -> range:
         """The numbers of all cells."""
-        return range(math.prod(self._sizes))
+        return range(math.prod(self._axis_lengths))
 
     def indices(self, cell: int) -> tuple[int, ...]:
-        """Return the index of each axis's value at a cell; the last axis runs fastest."""
-        return tuple(map(int, np.unravel_index(cell, self._sizes)))
+        """Return the index of each axis's value in a cell; the last axis varies fastest."""
+        return tuple(map(int, np.unravel_index(cell, self._axis_lengths)))
 
     def cell_at(self, indices: Sequence[int]) -> int:
-        """Return the cell with these indices."""
-        return int(np.ravel_multi_index(tuple(indices), self._sizes)) if indices else 0
+        """Return the number of the cell with these axis value indices."""
+        return int(np.ravel_multi_index(tuple(indices), self._axis_lengths)) if indices else 0
 
     @property
-    def runs_begun(self) -> int:
-        """How many runs of a cell are begun: replicas, or with splitting those of their stage."""
+    def runs_started_per_cell(self) -> int:
+        """Number of runs started per cell: the replicas, times a stage's runs with splitting."""
         return self.replicas * (1 if self.splitting is None else self.splitting.runs)
 
     @property
     def batch(self) -> int:
-        """How many replicas of a cell are run before the results are looked at."""
+        """Replicas of a cell between two checks of the stop criterion; all without a criterion."""
         return self.stop_when.batch if self.stop_when else self.replicas
 
     @property
     def round_ends(self) -> list[int]:
-        """The replica before which each round ends, in which results are looked at."""
+        """The replica before which each round ends; results are checked between rounds."""
         if self.allocate:
             return round_ends(self.replicas, self.stop_when.batch if self.stop_when else None)
         return [min(n + self.batch, self.replicas) for n in range(0, self.replicas, self.batch)]
 
     def labels(self, cell: int) -> dict[str, Any]:
-        """Return column → value of every axis at a cell."""
+        """Return column → label of every axis's value in a cell."""
         indices = self.indices(cell)
         return {a.column: a.labels[i] for a, i in zip(self.axes, indices, strict=True)}
 
-    def changes(self, cell: int) -> tuple[list[tuple[str, str]], list[tuple[str, Any]]]:
-        """Return the swaps and the values that make a cell's scene of the base scene."""
+    def swaps_and_sets(self, cell: int) -> tuple[list[tuple[str, str]], list[tuple[str, Any]]]:
+        """Return (swaps, set values) from base to cell scene, each as (name, value) pairs."""
         swaps, sets = list(self.swaps), list(self.sets)
         for axis, index in zip(self.axes, self.indices(cell), strict=True):
             swaps += axis.swaps[index]
@@ -172,17 +172,17 @@ class Study:
 
     def scene(self, cell: int) -> Scene:
         """Return the checked scene of a cell."""
-        return changed_scene(self.base, *self.changes(cell), str(self.path))
+        return changed_scene(self.base, *self.swaps_and_sets(cell), str(self.path))
 
     def member_seed(self, cell: int) -> int:
-        """Return the seed of a cell's encounter; without a sample the study's."""
+        """Return the seed of all runs of a cell's encounter; the study's if axes are no sample."""
         if not self.over:
             return self.seed
         members = zip(self.axes, self.indices(cell), strict=True)
         return member_seed(self.seed, ((a, i) for a, i in members if a.column in self.over))
 
     def replica(self, number: int, cell: int = 0) -> Replica:
-        """Return the seed and the drawn values of a replica.
+        """Return the seed and the drawn values of a replica as a `Replica`.
 
         They are the same in all cells, or in all cells of the same encounter where the study runs
         over a sample (`over`).
@@ -194,7 +194,7 @@ class Study:
         )
 
     def repetition(self, number: int, cell: int) -> tuple[list[Replica], int]:
-        """Return the runs that a repetition of splitting begins with, and its branches' seed.
+        """Return the first runs of a repetition of splitting, and the seed of its branches.
 
         Each of the runs is one of a plain study. Number -1 is the pilot, which has draws of its
         own.
@@ -210,7 +210,7 @@ class Study:
 
     def command(self, cell: int, number: int) -> str:
         """Return the command that runs one replica of a cell again."""
-        swaps, sets = self.changes(cell)
+        swaps, sets = self.swaps_and_sets(cell)
         replica = self.replica(number, cell)
         changes = [
             (key, format_set_value(value)) for key, value in [*sets, *replica.changes.items()]
@@ -220,7 +220,7 @@ class Study:
     def chunks(
         self, round_number: int, cells: Sequence[int], plans: Mapping[int, Allocation] | None = None
     ) -> Iterator[Chunk]:
-        """Return the chunks of one round: a batch of replicas of each of the given cells.
+        """Yield one round's chunks, which hold a batch of replicas of each given cell.
 
         Of each chunk `runs_per_chunk` are flown, as many as a plan leads to expect.
         """
@@ -244,7 +244,7 @@ class Study:
 
 
 def format_set_value(value: Any) -> str:
-    """Return a value the way ``--set`` takes it; a path as it is found from the study's folder."""
+    """Return a value as text for ``--set``; a file named from its own folder becomes its path."""
     folder = getattr(value, "folder", None)
     if folder is not None and (path := existing_file(value, folder)) is not None:
         return str(path)
@@ -255,8 +255,8 @@ def format_set_value(value: Any) -> str:
     return format_value(value)
 
 
-def command_of(words: Iterable[str], sets: Iterable[str], *paths: Path) -> str:
-    """Return the command line that runs files with the same ``--set`` from any folder."""
+def portable_command_line(words: Iterable[str], sets: Iterable[str], *paths: Path) -> str:
+    """Return the ``dsa-des`` command with these words, ``--set`` and paths, for any folder."""
     every = ["dsa-des", *words]
     for key, value in read_sets(sets)[0]:
         every += [
@@ -272,8 +272,8 @@ def changed_scene(
     sets: Sequence[tuple[str, Any]],
     source: str,
 ) -> Scene:
-    """Return the checked scene that swaps and values make of a scene's tables."""
+    """Return the checked scene of a copy of the base tables with swaps and set values applied."""
     file, folder = base.copy(), Path(source).parent
-    types = [(SWAP + block, add_source(name, folder)) for block, name in swaps]
+    types = [(SWAP + block, with_source_folder(name, folder)) for block, name in swaps]
     apply_changes(file, [*types, *sets], source, source, "swap")
     return check_scene(file)

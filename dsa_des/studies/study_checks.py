@@ -10,13 +10,13 @@ from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.results.record import FRACTION, NUMBER, RATIO, SHARE, TRIALS, Result
-from dsa_des.results.summary import results_of_series
+from dsa_des.results.summary import result_numbers_of_series
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
-from dsa_des.studies.foreseen import allocation_refusal
+from dsa_des.studies.foreseen_runs import allocation_refusal
 from dsa_des.studies.metric import Metric, check_recorded
 from dsa_des.studies.splitting import SplitEvent, splitting_refusal
 from dsa_des.studies.study import AUTO, Study
@@ -69,7 +69,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
     if len(file.problems) == before:
         _check_set_up(study, scenes, file)
     if len(file.problems) == before:
-        _check_ends(study, scenes, file)
+        _check_last_of_sequences(study, scenes, file)
     if len(file.problems) == before and study.allocate:
         try:
             why_not = allocation_refusal(study, first)
@@ -79,9 +79,9 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
             file.report(("allocate",), why_not)
 
 
-def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
-    """Set up the last run of each sequence: what it counts may end before, as a file does."""
-    last = study.runs_begun - 1
+def _check_last_of_sequences(study: Study, scenes: list[Scene], file: SceneFile) -> None:
+    """Set up a run with each sequence draw's last value; report failure, as for a short file."""
+    last = study.runs_started_per_cell - 1
     for draw in study.draws:
         if draw.kind != "sequence" or not last:
             continue
@@ -96,14 +96,16 @@ def _check_ends(study: Study, scenes: list[Scene], file: SceneFile) -> None:
             else:
                 continue
             file.report(
-                ("draws", draw.key), f"of the last of {study.runs_begun} replicas: {text}", value
+                ("draws", draw.key),
+                f"of the last of {study.runs_started_per_cell} replicas: {text}",
+                value,
             )
             break
 
 
-def _explain_endless(study: Study, scans: float) -> str:
-    """Return why a study whose runs have so many scans is not begun, nothing if it is."""
-    runs = study.runs_begun * len(study.cells)
+def _explain_too_many_scans(study: Study, scans: float) -> str:
+    """Return why a study with so many scans per run is too large to start; empty if it is not."""
+    runs = study.runs_started_per_cell * len(study.cells)
     if runs * scans <= MOST_STUDY_SCANS:
         return ""
     return (
@@ -125,7 +127,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
         try:
             recorder = Recorder([], wanted=dict.fromkeys(_tables_read(study, scene), ()))
             simulation = Simulation(replica_scene(scene, study.replica(0)), recorder=recorder)
-            if wrong is None and (said := _explain_endless(study, simulation.scans)):
+            if wrong is None and (said := _explain_too_many_scans(study, simulation.scans)):
                 file.report(("replicas",), said)
                 return
             blocks = simulation.components
@@ -158,7 +160,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
 
 
 def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -> None:
-    """Report names of results that no metric gives, and figures of results they cannot show."""
+    """Report result names that no metric produces, and figures that cannot show their results."""
     names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.is_summarised]
 
     def missing(key: Key, name: str) -> None:
@@ -180,7 +182,7 @@ def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -
             missing(("requirements", number, "metric"), wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure.kind == "series":
-            if not results_of_series(str(figure.metric), results):
+            if not result_numbers_of_series(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
                 file.report(("figures", number, "metric"), message, str(figure.metric))
         elif figure.kind != "run" and figure.metric not in names:
@@ -197,7 +199,7 @@ def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -
 
 
 def _check_axes(study: Study, file: SceneFile) -> None:
-    """Report a key that two axes set: the second would win without a word."""
+    """Report keys that two axes set, of which the second would silently win."""
     owner: dict[tuple[str | int, ...], str] = {}
     for axis in study.axes:
         for key in {key for sets in axis.sets for key, _ in sets}:
@@ -207,7 +209,7 @@ def _check_axes(study: Study, file: SceneFile) -> None:
 
 
 def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
-    """Report draws of values that the scene does not allow, and of keys that are axes."""
+    """Report draws whose values the scene does not allow, and draws of keys that are axes."""
     tables = study.base.data
     on_axes = {
         parse_key_path(tables, key): axis.key
@@ -218,7 +220,7 @@ def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
     for draw in study.draws:
         if axis := on_axes.get(parse_key_path(tables, draw.key)):
             file.report(("draws", draw.key), f"is set by the axis {axis}: draw it, or vary it")
-        for value in _extreme_draws(draw, study):
+        for value in _extreme_drawn_values(draw, study):
             try:
                 replica_scene(scene, Replica(0, {draw.key: value}))
             except SceneError as error:
@@ -229,15 +231,18 @@ def _check_draws(study: Study, scene: Scene, file: SceneFile) -> None:
                     break
 
 
-def _extreme_draws(draw: Draw, study: Study) -> list[Any]:
-    """Return the values of a draw that show whether it is allowed.
+def _extreme_drawn_values(draw: Draw, study: Study) -> list[Any]:
+    """Return the drawn values that are to be checked: the extreme ones, or all of a choice.
 
     Those of a normal distribution have no ends: a replica that draws too far out fails by itself.
     """
     if draw.kind == "choice":
         return list(draw.values)
     if draw.kind == "sequence":
-        return [draw.value(study.seed, number, study.batch) for number in (0, study.runs_begun - 1)]
+        return [
+            draw.value(study.seed, number, study.batch)
+            for number in (0, study.runs_started_per_cell - 1)
+        ]
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
     cells = study.cells if study.over else range(1)
     seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))
@@ -246,7 +251,7 @@ def _extreme_draws(draw: Draw, study: Study) -> list[Any]:
 
 
 def _build_metrics(study: Study, scene: Scene, where: str, file: SceneFile) -> list[Metric]:
-    """Return the study's metrics for a scene; what the scene lacks is a problem."""
+    """Return the study's metrics built for a scene; those that fail are reported and left out."""
     built: list[Metric] = []
     for spec in study.metrics:
         try:
@@ -257,7 +262,7 @@ def _build_metrics(study: Study, scene: Scene, where: str, file: SceneFile) -> l
 
 
 def _tables_read(study: Study, scene: Scene) -> set[str]:
-    """Return the tables that the metrics read; problems of metrics are reported elsewhere."""
+    """Return the names of tables that metrics read; metrics that cannot be built are left out."""
     tables: set[str] = set()
     for spec in study.metrics:
         with contextlib.suppress(ValueError):
@@ -275,10 +280,12 @@ def cells_covering_values(study: Study) -> list[int]:
 
 
 def _scenes_by_block_types(scenes: list[Scene]) -> list[Scene]:
-    """Return one scene for every set of block types."""
+    """Return one scene for every distinct assignment of types to blocks."""
     by_types: dict[tuple[Any, ...], Scene] = {}
     for scene in scenes:
-        by_types.setdefault(tuple(sorted((n, c.path()) for n, c in scene.classes.items())), scene)
+        by_types.setdefault(
+            tuple(sorted((n, c.import_path()) for n, c in scene.classes.items())), scene
+        )
     return list(by_types.values())
 
 

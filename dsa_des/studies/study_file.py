@@ -14,7 +14,7 @@ from dsa_des.block.source_file import absolute_type_name
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.results.record import Requirement, StopWhen
-from dsa_des.scene.checks import check_lookalikes, read_table
+from dsa_des.scene.checks import read_table, report_silent_conversions
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.keys import Key, flatten_tables
 from dsa_des.scene.overrides import SWAP, apply_sets, read_sets
@@ -63,7 +63,7 @@ def study_of_scene(
     sets: Iterable[str] = (),
     seed: int = 0,
 ) -> Study:
-    """Return a study of a scene with some of its values set: some replicas, the named metrics."""
+    """Return a study of replicas of one scene, with values set, measuring the named metrics."""
     values, problems = read_sets(sets)
     if problems:
         raise SceneError(problems)
@@ -83,7 +83,7 @@ def study_of_tables(
     swaps: Sequence[tuple[str, str]],
     sets: Sequence[tuple[str, Any]],
 ) -> Study:
-    """Return a study of a scene that was read already.
+    """Return a study of a scene whose tables were read already.
 
     `tables` are as a study file would hold them, without ``scene``, ``set`` and ``swap``; `swaps`
     and `sets` are made in every cell.
@@ -96,7 +96,7 @@ def _as_list(names: str | list[str]) -> list[str]:
 
 
 class _StudyReader:
-    """Reads a study; its scene, and changes of every cell, may be given beside its tables."""
+    """Builds a study from its tables; scene and changes for each cell may be given separately."""
 
     def __init__(
         self,
@@ -123,7 +123,7 @@ class _StudyReader:
         ):
             if self._base is None and "scene" not in self.data and key in self.data:
                 raise SceneError([Problem(str(file.path), "", message)])
-        keys = self.keys = self.plain_keys()
+        keys = self.keys = self.checked_keys()
         draws = self.draws()
         splitting = self.splitting()
         specs = self.metric_specs(splitting)
@@ -141,7 +141,7 @@ class _StudyReader:
             runs_are = f"{cells:,} cells make {runs:,} runs" if runs < 10**18 else "are too many"
             file.report(("replicas",), f"{runs_are}; at most {MOST_RUNS:,} runs are allowed")
             raise SceneError(file.problems)
-        baseline, weight = self.read_compared(axes)
+        baseline, weight = self.read_baseline_and_weight(axes)
         study = Study(
             path=Path(file.path),
             scene_path=Path(base.path),
@@ -153,7 +153,7 @@ class _StudyReader:
             metrics=specs,
             sets=self.sets(),
             swaps=self.swaps(),
-            over=self.read_over(axes),
+            over=self.sampled_axis_columns(axes),
             baseline=baseline,
             stop_when=stop_when,
             confidence=keys.confidence,
@@ -177,8 +177,8 @@ class _StudyReader:
         file.refuse()
         return study
 
-    def plain_keys(self) -> StudyKeys:
-        """Return the keys of the study; those that are wrong are reported and have defaults."""
+    def checked_keys(self) -> StudyKeys:
+        """Return the study's keys; wrong ones are reported and replaced by their defaults."""
         try:
             keys = StudyKeys.model_validate(self.data)
         except ValidationError as error:
@@ -188,7 +188,7 @@ class _StudyReader:
             wrong = {item["loc"][0] for item in error.errors(include_url=False)}
             sound = {key: value for key, value in self.data.items() if key not in wrong}
             keys = StudyKeys.model_validate(sound)
-        check_lookalikes(self.file, (), self.data, keys)
+        report_silent_conversions(self.file, (), self.data, keys)
         for key, value in flatten_tables(keys.set).items():
             if key.startswith(SWAP):
                 self.file.report(
@@ -211,7 +211,7 @@ class _StudyReader:
 
     def scene(self) -> tuple[SceneFile | None, Scene | None]:
         if self._base is not None:
-            return self.check_base(self._base)
+            return self.checked_base_scene(self._base)
         name = self.keys.scene
         if not isinstance(name, str):
             self.file.report(("scene",), "is required: the TOML file of the scene that is studied")
@@ -230,9 +230,9 @@ class _StudyReader:
         except SceneError as error:
             self.file.problems += error.problems
             return None, None
-        return self.check_base(base)
+        return self.checked_base_scene(base)
 
-    def check_base(self, base: SceneFile) -> tuple[SceneFile | None, Scene | None]:
+    def checked_base_scene(self, base: SceneFile) -> tuple[SceneFile | None, Scene | None]:
         for swaps, sets in ((self.swaps(), self.sets()), ((), ())):
             try:
                 return base, changed_scene(base, swaps, sets, str(self.file.path))
@@ -264,7 +264,7 @@ class _StudyReader:
         return tuple(draws)
 
     def column(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
-        """Return the column of the axis that `name` means."""
+        """Return the results column of axis `name`; None, with a report, if there is none."""
         columns = [axis.column for axis in axes]
         wanted = str(name).removeprefix("blocks.")
         if wanted in columns:
@@ -275,15 +275,17 @@ class _StudyReader:
         self.file.report(key, f"the study has no such axis{hint}", str(name))
         return None
 
-    def read_over(self, axes: tuple[Axis, ...]) -> tuple[str, ...]:
+    def sampled_axis_columns(self, axes: tuple[Axis, ...]) -> tuple[str, ...]:
         names = self.keys.over
         if names is None:
             return tuple(axis.column for axis in axes if axis.files)
         names = [names] if isinstance(names, str) else names
         return tuple(c for n in names if (c := self.column(("over",), n, axes)) is not None)
 
-    def read_compared(self, axes: tuple[Axis, ...]) -> tuple[tuple[str, Any] | None, str | None]:
-        """Return the value of an axis that others are compared with, and the result that weighs."""
+    def read_baseline_and_weight(
+        self, axes: tuple[Axis, ...]
+    ) -> tuple[tuple[str, Any] | None, str | None]:
+        """Return the comparison's (axis column, baseline) and weight result; None if not given."""
         if self.keys.compare is None:
             first = next((axis for axis in axes if axis.key.startswith("swap.")), None)
             return None if first is None else (first.column, first.labels[0]), None
@@ -354,7 +356,7 @@ class _StudyReader:
         return tuple(specs)
 
     def splitting(self) -> Splitting | None:
-        """Return the table of splitting, whose replicas are repetitions."""
+        """Return the settings of splitting; None if there are none, or wrong ones (reported)."""
         if self.keys.splitting is None:
             return None
         table = read_table(self.file, ("splitting",), SplittingTable, self.keys.splitting)

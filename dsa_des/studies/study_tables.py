@@ -27,7 +27,7 @@ _PATTERNS = "files"
 def resolve_tables(
     data: Mapping[str, Any], swaps: Iterable[tuple[str, list[str]]]
 ) -> dict[str, Any]:
-    """Return a study's tables with absolute paths, and further swap axes."""
+    """Return a study's tables with absolute paths, and with `swaps` added as axes."""
     tables = {
         key: value if key in _NAMING_RESULTS else _make_paths_absolute(value)
         for key, value in data.items()
@@ -101,13 +101,13 @@ _Whole = Annotated[int, Field(ge=0)]
 
 
 class StudyTable(BaseModel):
-    """A table of a study file, as far as it can be judged without the scene."""
+    """Base of the tables of a study file, which checks what can be checked without the scene."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
 
 
 class StudyKeys(StudyTable):
-    """The keys of a study file; of those without a type the values are judged one by one."""
+    """The keys of a study file; those of type Any are checked one by one later."""
 
     title: Any = None
     description: Any = None
@@ -132,7 +132,7 @@ class StudyKeys(StudyTable):
 
 
 class StopWhenTable(StudyTable):
-    """When a cell has enough replicas."""
+    """Settings for when a cell has enough replicas."""
 
     metric: _ResultName
     half_width: float = Field(gt=0)
@@ -140,7 +140,7 @@ class StopWhenTable(StudyTable):
 
 
 class SplittingTable(StudyTable):
-    """Of which event a rare probability is found by splitting, and how."""
+    """Settings for estimating the probability of a rare event by splitting."""
 
     event: _ResultName
     runs: int = Field(default=200, ge=10, le=100_000)
@@ -156,22 +156,22 @@ class SplittingTable(StudyTable):
 
 
 class CompareTable(StudyTable):
-    """With which value of which axis the others are compared."""
+    """The axis, and the value of it, with which the others are compared."""
 
     axis: str
     baseline: Any
     weight: _ResultName | None = None
 
 
-def _split_limits(limits: Any) -> Any:
+def _wrap_limits_in_list(limits: Any) -> Any:
     return limits if isinstance(limits, list) else [limits]
 
 
 class FigureTable(FigureRecord):
-    """A figure as a study file states it; `_KEYS_OF_FIGURES` has those of each kind."""
+    """A figure as a study file writes it; `_KEYS_OF_FIGURES` has the keys of each kind."""
 
     kind: FigureKind = "axis"
-    limits: Annotated[list[float], BeforeValidator(_split_limits)] = Field(
+    limits: Annotated[list[float], BeforeValidator(_wrap_limits_in_list)] = Field(
         default=[], alias="limit"
     )
 
@@ -196,7 +196,7 @@ def read_figures(
     runs: Mapping[str, int],
     column_of: Callable[[Key, Any], str | None],
 ) -> tuple[FigureRecord, ...]:
-    """Return the figures of a study; what is wrong with them is reported.
+    """Return the figures of a study; what is wrong with them is added to the file's problems.
 
     `runs` says how many cells and replicas it has, and `column_of` which axis a name means.
     """

@@ -18,12 +18,12 @@ _OFFSET = 128
 
 
 class Terminated(KeyboardInterrupt):
-    """SIGTERM or SIGHUP arrived; whatever clears up after ctrl-C does so after these as well."""
+    """Raised when SIGTERM or SIGHUP arrives; what cleans up after ctrl-C then does so as well."""
 
 
 @contextmanager
-def plain_ending() -> Iterator[None]:
-    """End the program by one line and the exit code of the signal when one arrives.
+def exit_plainly_on_signal() -> Iterator[None]:
+    """Turn a signal inside the block into one line of text and the signal's exit code.
 
     What a signal interrupts may raise anything (an import that is broken off, a thread pool that
     is closed), so after a signal every exception is its consequence. Handlers that other code
@@ -64,7 +64,7 @@ def _print_signal_line(what: str) -> None:
 
 @contextmanager
 def defer_signals() -> Iterator[None]:
-    """Let signals that ask for an end wait until the block is done.
+    """Delay signals that ask the program to end until the block is done.
 
     For the few steps that must not be done by halves: giving results their name, clearing up.
     """
@@ -83,7 +83,7 @@ def defer_signals() -> Iterator[None]:
 
 @contextmanager
 def _install_handler(handler: Any, replaces: Any) -> Iterator[None]:
-    """Handle our signals with `handler` where `replaces` says so of the handler there is."""
+    """Inside the block, handle ending signals with `handler` if `replaces` accepts the old one."""
     before: dict[int, Any] = {}
     try:
         # Python hands signals to the main thread only, and lets no other one set handlers.

@@ -11,7 +11,7 @@ from dsa_des.text.safe_text import printable
 
 
 class SafeConsole(Console):
-    """Prints every ``str`` as it is, on one line and with its control characters escaped.
+    """A Rich console that prints every ``str`` literally, with control characters escaped.
 
     Text of several lines is given as `rich.text.Text`, whose line feeds stay; all else that is
     not printable is escaped in it as well. Parameters are those of `rich.console.Console`.
@@ -21,14 +21,14 @@ class SafeConsole(Console):
         super().__init__(**options, markup=False, emoji=False)
 
     def render_str(self, text: str, **options: Any) -> Text:
-        """Return a ``str`` as text to be printed as it is; see `rich.console.Console`."""
+        """Return a ``str`` as rich Text without markup, with control characters escaped."""
         options |= {"markup": False, "emoji": False}
         return super().render_str(printable(text), **options)
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
     ) -> Iterable[Segment]:
-        """Render as Rich does; whatever text comes of it is printable."""
+        """Render as Rich does, escaping what is not printable or the stream cannot encode."""
         encoding = self.encoding or "utf-8"
         for segment in super().render(renderable, options):
             text = segment.text

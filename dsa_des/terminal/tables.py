@@ -45,7 +45,7 @@ def print_table(
     names, cells = [names[k] for k in used], [[row[k] for k in used] for row in cells]
     group = used.index(group) if group in used and cells else None
     right = [used.index(k) for k in right if k in used]
-    _put_folded(console, printable(title), "italic")
+    _print_folded(console, printable(title), "italic")
     if group is None or _total_width(_natural_widths(names, cells)) <= console.width:
         notes_below = [""] * len(cells)
         if below in used and _total_width(_natural_widths(names, cells)) > console.width:
@@ -64,7 +64,7 @@ def print_table(
     for name, some in together.items():
         note = (notes or {}).get(name, "")
         _print(console)
-        _put_folded(console, f"{name}: {printable(note)}" if note else name, "bold cyan")
+        _print_folded(console, f"{name}: {printable(note)}" if note else name, "bold cyan")
         used = [k for k in range(len(short)) if any(row[k] for row in some)]
         shown = [[row[k] for k in used] for row in some]
         _print_rows(console, [short[k] for k in used], shown)
@@ -102,16 +102,16 @@ def _print_line(
 
 
 def _print_lists(console: Any, names: list[str], cells: list[list[str]]) -> None:
-    """Print each row as a list, its empty values left out."""
+    """Print each row as lines ``name: value``, without empty values."""
     for number, row in enumerate(cells):
         if number:
             _print(console)
         for name, cell in zip(names, row, strict=True):
             if cell:
-                _put_folded(console, f"{name}: {cell}")
+                _print_folded(console, f"{name}: {cell}")
 
 
-def _put_folded(console: Any, text: str, style: str = "") -> None:
+def _print_folded(console: Any, text: str, style: str = "") -> None:
     for line in fold(text, console.width):
         _print(console, line, style)
 
@@ -123,7 +123,7 @@ def _print(console: Any, text: str = "", style: str = "") -> None:
 
 
 def fold(text: str, width: int) -> list[str]:
-    """Return a text in lines of at most `width`, folded where its words end if they are short."""
+    """Return a text as lines of at most `width` characters, broken between words where possible."""
     if _visible_length(text) <= width:
         return [text]
     lines = [""]
@@ -165,7 +165,7 @@ def _natural_widths(names: list[str], cells: list[list[str]]) -> list[int]:
 
 
 def _column_widths(names: list[str], cells: list[list[str]], most: int) -> _Layout:
-    """Return the width of each column and of the gaps; no widths where nothing fits."""
+    """Return the widths of columns, and of their gap, that fit into `most`; none if none fit."""
     widths = _natural_widths(names, cells)
     of_cells = [
         max((_visible_length(row[k]) for row in cells), default=0) for k in range(len(names))

@@ -17,17 +17,17 @@ from dsa_des.text.safe_text import printable
 
 
 def say(line: object = "", *, err: bool = False) -> None:
-    """Print one line, on standard error with `err`; what could break out of it is escaped."""
+    """Print one line, on standard error with `err`, with control characters escaped."""
     _write(printable(line), err)
 
 
 def say_lines(text: str, *, err: bool = False) -> None:
-    """Print text of several lines, whose parts were made printable before they were put in."""
+    """Print text of several lines; control characters other than line breaks are escaped."""
     _write(printable(text, lines=True), err)
 
 
 def say_json(value: Any) -> None:
-    """Print a value as JSON; all that is not ASCII is an escape, numbers that are none are null."""
+    """Print a value as JSON in ASCII only; NaN and infinities become null."""
     _write(json_text(value, indent=2, ensure_ascii=True), False)
 
 
@@ -50,8 +50,8 @@ def console(width: int | None = None, *, err: bool = False) -> Any:
     return result if known else SafeConsole(stderr=err, width=width)
 
 
-def text_of(show: Callable[[Any], None], width: int = 110) -> str:
-    """Return what a function prints on a console, as plain text for ``print``."""
+def capture_text(show: Callable[[Any], None], width: int = 110) -> str:
+    """Return, as plain text, what a function prints on a console."""
     from dsa_des.terminal.safe_console import SafeConsole
 
     file = io.StringIO()
@@ -59,8 +59,8 @@ def text_of(show: Callable[[Any], None], width: int = 110) -> str:
     return "\n".join(line.rstrip() for line in file.getvalue().splitlines())
 
 
-def html_of(show: Callable[[Any], None]) -> str:
-    """Return what a function prints on a console, as HTML for a notebook."""
+def capture_html(show: Callable[[Any], None]) -> str:
+    """Return, as HTML for a notebook, what a function prints on a console."""
     from dsa_des.terminal.safe_console import SafeConsole
 
     # In a notebook Rich would show each line by itself, beside what is returned.

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def json_text(content: Any, *, digits: int = 17, **options: Any) -> str:
-    """Return content as JSON text, floats to so many digits; NaN and infinities become null."""
+    """Return JSON text, floats rounded to `digits` significant digits, NaN and infinities null."""
     return json.dumps(_json_value(content, digits), allow_nan=False, **options)
 
 

@@ -12,7 +12,7 @@ def run_command(
     swaps: Iterable[tuple[str, str]],
     sets: Iterable[tuple[str, str]],
 ) -> str:
-    """Return the command that runs a scene with a seed, swaps and values, fit for a shell."""
+    """Return the shell command ``dsa-des run`` for a scene with a seed, swaps and set values."""
     words = ["dsa-des", "run", scene, "--seed", str(seed)]
     for block, name in swaps:
         words += ["--swap", f"{block}={name}"]
@@ -22,7 +22,7 @@ def run_command(
 
 
 def format_value(value: Any) -> str:
-    """Return a value the way ``--set`` takes it."""
+    """Return a value as text in the form that ``--set`` takes."""
     if isinstance(value, Fraction):
         decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")
         return decimal if Fraction(decimal) == value else f'"{value}"'

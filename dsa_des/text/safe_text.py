@@ -58,12 +58,12 @@ def _escape_character(letter: str) -> str:
 
 
 def shell_line(words: Iterable[str]) -> str:
-    """Return words as a line that a shell reads back as the same words."""
+    """Return words joined and quoted, so that a shell reads back the same words."""
     return " ".join(map(_quote_for_shell, words))
 
 
 def _quote_for_shell(word: str) -> str:
-    """Return a word as a shell reads it back; one that cannot be shown, with escapes."""
+    """Return a word quoted for a shell, with unprintable characters as octal escapes."""
     if word.isprintable():
         return shlex.quote(word)
     plain = word.replace("\\", "\\\\").replace("'", "\\'")

@@ -14,7 +14,7 @@ Change = tuple[int, ClockSpec]
 
 
 class ChangingClock:
-    """The scan instants of one block, numbered through over all changes of its clock.
+    """Scan instants of a block whose clock changes in a run, numbered on over all changes.
 
     A clock of a new rate counts from the instant of the change on, where its first scan is. One
     that drifts or jitters otherwise goes on from the scans before; another offset moves them by as
@@ -60,7 +60,7 @@ class ChangingClock:
         self.period: Fraction = min(clock.period for clock in self._clocks)
 
     def ticks(self, scans: IntArray) -> IntArray:
-        """Return the ticks of the given scan numbers (n,)."""
+        """Return the ticks of the scans with the given numbers, (n,)."""
         scans = np.asarray(scans, dtype=np.int64)
         part = np.searchsorted(self._number[1:-1], scans, side="right")
         ticks = np.empty_like(scans)
@@ -72,16 +72,16 @@ class ChangingClock:
         return ticks
 
     def previous_ticks(self, scans: IntArray) -> IntArray:
-        """Return when the scan before each was, in ticks of its own run; -1 before the first."""
+        """Return the tick of the scan before each given one in its run; -1 before the first."""
         earlier = np.asarray(scans, dtype=np.int64) - 1
         return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
 
     def next_scan_bound(self, tick: int) -> int:
-        """Return a lower bound of the ticks of all scans at or after `tick`."""
+        """Return a tick that is no later than any scan at or after `tick`: a lower bound."""
         return tick
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
-        """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""
+        """Return (scan numbers, ticks) of the scans with start <= tick < end, in order."""
         found: list[IntArray] = [np.empty(0, dtype=np.int64)]
         for part, clock in enumerate(self._clocks):
             first, last = max(start, int(self._from[part])), min(end, int(self._from[part + 1]))
@@ -102,7 +102,7 @@ class ChangingClock:
 def _continue_clock(
     old: ClockSpec, new: ClockSpec, clock: ScanClock, start: int, ticks_per_s: int
 ) -> ClockSpec:
-    """Return the clock that another one becomes at a tick, with the offset of its grid."""
+    """Return the clock specification from tick `start`, on the old grid unless the rate changes."""
     if new.rate_hz != old.rate_hz:
         return replace(new, offset_s=Fraction(start, ticks_per_s))
     scan = clock.first_scan_at_or_after(start)

@@ -57,7 +57,7 @@ _TOO_LONG = f"must be a number that is a fraction of whole numbers of at most {_
 
 
 def _has_too_many_digits(text: str) -> bool:
-    """Return, without expanding it, whether a text is a number of too many digits."""
+    """Return whether a number's text or exponent is too long to expand into an exact fraction."""
     exponent = _EXPONENT.search(text[-_LONGEST_TEXT:])
     return len(text) > _LONGEST_TEXT or (
         exponent is not None and abs(int(exponent[1])) > _LONGEST_TEXT
@@ -70,7 +70,7 @@ def common_ticks_per_second(times_s: Iterable[Fraction]) -> int:
 
 
 def nanosecond_of(ticks: IntArray, ticks_per_s: int) -> IntArray:
-    """Return the whole nanoseconds at ticks of any `common_ticks_per_second`, as keys of draws.
+    """Return ticks as whole nanoseconds, which key the random draws of an instant.
 
     A block more or less in a scene may change the resolution; what an instant draws must not.
     """
@@ -79,7 +79,7 @@ def nanosecond_of(ticks: IntArray, ticks_per_s: int) -> IntArray:
 
 @dataclass(frozen=True)
 class ClockSpec:
-    """What a scene says of a clock: rate in Hz, offset in s, rate error in ppm, jitter in s.
+    """Settings of a scan clock: rate in Hz, offset in s, rate error in ppm, jitter in s.
 
     `jitter_s` is the standard deviation of the scan instants about their grid, before they are cut
     at `MOST_JITTER`.
@@ -101,7 +101,7 @@ class ClockSpec:
 
 
 class ScanClock:
-    """The scan instants of one block, in ticks.
+    """The scan instants of one block's clock, in ticks.
 
     Scan k is at ``offset + k * period``, exactly. A clock with a rate error runs at
     ``rate * (1 + ppm * 1e-6)``; its instants are rounded once each to the nearest tick (never
@@ -141,7 +141,7 @@ class ScanClock:
         #: How far jitter moves a scan off its grid at most, ticks.
         self._margin = 0 if self._jitter_draw is None else math.ceil(self._jitter_limit) + 1
 
-    def _grid(self, scans: IntArray) -> IntArray:
+    def _grid_ticks(self, scans: IntArray) -> IntArray:
         ticks: IntArray = self.offset + scans * self._whole
         if self._rest == 0:
             return ticks
@@ -154,9 +154,9 @@ class ScanClock:
         return ticks + extra
 
     def ticks(self, scans: IntArray) -> IntArray:
-        """Return the ticks of the given scan numbers (shape kept, int64)."""
+        """Return the ticks of the scans with the given numbers (same shape, int64)."""
         scans = np.asarray(scans, dtype=np.int64)
-        ticks = self._grid(scans)
+        ticks = self._grid_ticks(scans)
         if self._jitter_draw is not None:
             shift = self._jitter_ticks * self._jitter_draw(scans)
             shift = np.clip(shift, -self._jitter_limit, self._jitter_limit)
@@ -164,7 +164,7 @@ class ScanClock:
         return ticks
 
     def previous_ticks(self, scans: IntArray) -> IntArray:
-        """Return when the scan before each was, in ticks of its own run; -1 before the first."""
+        """Return the tick of the scan before each given one in its run; -1 before the first."""
         earlier = np.asarray(scans, dtype=np.int64) - 1
         return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
 
@@ -175,23 +175,23 @@ class ScanClock:
         return int(self.ticks(np.array([scan], dtype=np.int64))[0])
 
     def first_scan_at_or_after(self, tick: int) -> int:
-        """Return the number of the first scan (not below 0) whose grid instant is >= tick."""
+        """Return the number, from 0, of the first scan at or after `tick`, ignoring jitter."""
         # Half a tick before it or later, in Python integers, which neither round nor overflow;
         # Fractions took ten times as long.
         half_ticks = 2 * (tick - self.offset) - 1
         return max(0, -(-half_ticks * self._denominator // self._two_periods))
 
     def _grid_tick(self, scan: int) -> int:
-        """Return one grid instant in Python integers, which cannot overflow."""
+        """Return the tick of one scan without jitter, in Python integers, which cannot overflow."""
         r, d = self._rest, self._denominator
         return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
 
     def next_scan_bound(self, tick: int) -> int:
-        """Return a lower bound of the ticks of all scans at or after `tick`."""
+        """Return a tick that is no later than any scan at or after `tick`: a lower bound."""
         return self._grid_tick(self.first_scan_at_or_after(tick - self._margin)) - self._margin
 
     def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
-        """Return the scan numbers and ticks of the scans with start <= tick < end, in order."""
+        """Return (scan numbers, ticks) of the scans with start <= tick < end, in order."""
         if end > MAX_TICK:
             raise ValueError(f"end is {end}: ticks must stay below {MAX_TICK} (64 bits)")
         if end <= start:
@@ -209,7 +209,7 @@ class ScanClock:
 
 
 class ScanCursor:
-    """Which scans of a clock have fallen due between one call and the next."""
+    """Steps through the scans of a clock and says which have become due since the last call."""
 
     def __init__(self, clock: ScanClock) -> None:
         self.clock = clock
@@ -223,8 +223,8 @@ class ScanCursor:
             scan += 1
         self.scan, self.tick = scan, at
 
-    def due(self, tick: int) -> tuple[int, int] | None:
-        """Return the latest scan that is due at `tick`, and how many before it were missed."""
+    def pop_due_scan(self, tick: int) -> tuple[int, int] | None:
+        """Return (latest scan due at `tick`, number missed) and move on; None if none is due."""
         if tick < self.tick:
             return None
         first = self.scan
@@ -234,7 +234,7 @@ class ScanCursor:
         return self.scan - 1, self.scan - 1 - first
 
     def next_scan_tick(self, tick: int) -> int:
-        """Return the tick of the first scan after `tick`; the cursor stays."""
+        """Return the tick of the first scan after `tick`, without moving the cursor."""
         if self.tick > tick:
             return self.tick
         ahead = ScanCursor(self.clock)

@@ -31,7 +31,7 @@ LONGEST_S = 1e7
 
 
 class GaussMarkov:
-    """A process with mean 0, variance 1 and correlation exp(-|dt| / tau), for each target.
+    """A Gauss-Markov process of mean 0, variance 1, correlation exp(-|dt| / tau), per target.
 
     Parameters
     ----------
@@ -108,16 +108,18 @@ class GaussMarkov:
     def _values_after_branches(
         self, branches: int, who: Any, instants: IntArray, first: int, runs: IntArray
     ) -> FloatArray:
-        """Return the values of runs after the first so many of their branches."""
+        """Return the process values of runs after their first `branches` branches, from each of
+        which on other draws apply.
+        """
         if not branches:
             return self._draw(self._stream.of_runs(runs), who, instants, first)
-        begin = self._stream.branches_of_runs(runs, branches)[0]
+        begin = self._stream.branch_start_and_stream(runs, branches)[0]
         before = self._values_after_branches(
             branches - 1, who, np.minimum(instants, begin), first, runs
         )
         later = np.flatnonzero(instants > begin)
         if len(later):
-            begin, stream = self._stream.branches_of_runs(runs[later], branches)
+            begin, stream = self._stream.branch_start_and_stream(runs[later], branches)
             left = np.exp((begin - instants[later]) / self._tau_ns)
             ends = (instants[later], begin)
             now, then = (self._draw(stream, who[later], at, first) for at in ends)
@@ -125,7 +127,7 @@ class GaussMarkov:
         return before
 
     def _draw(self, stream: Stream, who: Any, instants: IntArray, first: int) -> FloatArray:
-        """Return the values that a stream draws."""
+        """Return the process values at the given instants, from the draws of one stream."""
 
         def drawn(number: IntArray, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
             key = who + (number >> 32).astype(np.uint64) * _SPREAD
@@ -149,7 +151,9 @@ class GaussMarkov:
 
 
 def _bridge_weights(length: float) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Return weight of the ends and spread half-way, of an interval in correlation times."""
+    """Return (weight of either end, spread) for the middle of an interval of `length` correlation
+    times, and for the middle of its half.
+    """
     halves = length / 2.0, length / 4.0
     first, second = ((0.5 / math.cosh(s), math.sqrt(math.tanh(s))) for s in halves)
     return first, second

@@ -69,7 +69,7 @@ def _ten_rounds(
     x0: Any, x1: Any, x2: Any, x3: Any, keys: Any,
     m0: Any = _M0, m1: Any = _M1, low: Any = _LOW, half: Any = 32,
 ) -> Any:  # fmt: skip
-    """The generator itself, for arrays of uint64 or for Python's integers; a key for each round."""
+    """Return four words after ten Philox rounds, a key each, for uint64 arrays or integers."""
     for k0, k1 in keys:
         product0 = x0 * m0
         product1 = x2 * m1
@@ -83,13 +83,13 @@ def _ten_rounds(
 
 
 def key_of(*parts: object) -> int:
-    """Return a 64-bit key of the given parts; equal parts give equal keys on every machine."""
+    """Return a 64-bit hash of the given parts as a key, equal for equal parts on every machine."""
     text = "\x1f".join(f"{type(part).__name__}:{part}" for part in parts)
     return int.from_bytes(blake2b(text.encode(), digest_size=8).digest(), "little")
 
 
 def target_keys(names: tuple[str, ...]) -> UInt64Array:
-    """Return the 64-bit draw keys of named targets, shape (targets,)."""
+    """Return the 64-bit keys of targets by their names, shape (targets,), for random draws."""
     # As `key_of("target", name)`, which takes three times as long for each of a million names.
     texts = ("str:target\x1fstr:" + name for name in names)
     digests = b"".join(blake2b(text.encode(), digest_size=8).digest() for text in texts)
@@ -97,7 +97,7 @@ def target_keys(names: tuple[str, ...]) -> UInt64Array:
 
 
 class BranchedSeed(int):
-    """The seed of a run that draws by other seeds from some instants on.
+    """The seed of a run that switches to other seeds from some instants on.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ class BranchedSeed(int):
 
 
 def branch_seed(seed: int, from_ns: int, other: int) -> BranchedSeed:
-    """Return the seed of a run that draws as `seed` up to an instant, and then by another."""
+    """Return the seed of a run that draws by `seed` before an instant and by `other` from it on."""
     before = [one for one in getattr(seed, "branches", ()) if one[0] < from_ns]
     return BranchedSeed(int(seed), [*before, (from_ns, other)])
 
@@ -130,7 +130,7 @@ _NEVER_NS = 2**62
 
 
 class Stream:
-    """The draws of one block for one purpose; use one purpose for one distribution only.
+    """Random numbers of a block for one purpose; use one purpose for one distribution only.
 
     Of several runs, each with its own seed, `of_runs` tells the draws apart. `has_drawn_for_all`
     says whether something was drawn for all of them, with the seed of the first, and `shared` that
@@ -167,7 +167,7 @@ class Stream:
         ]
 
     def of_runs(self, run: IntArray, instant_ns: npt.ArrayLike | None = None) -> "Stream":
-        """Return the draws of rows of these runs (`Wake.run`), each with its own run's seed.
+        """Return the stream for rows of these runs (`Wake.run`), drawing by each run's own seed.
 
         `instant_ns` says when since the start of its run each row is drawn, for what is drawn anew
         at every instant: a draw of one key must always be of the same instant. Runs that branched
@@ -178,22 +178,24 @@ class Stream:
         which = run
         if self.branches and instant_ns is not None:
             begun = self._begin_ns[run] <= np.asarray(instant_ns)[..., np.newaxis]
-            which = self._branch_keys(run, begun.sum(axis=-1))
-        return _RunStream(self._rounds_of_all.take(which, axis=2))
+            which = self._branch_key_indices(run, begun.sum(axis=-1))
+        return _RunStream(self._round_keys_of_all.take(which, axis=2))
 
-    def branches_of_runs(self, run: IntArray, number: int) -> tuple[IntArray, "Stream"]:
-        """Return when a branch of each run begins, ns, and its draws; the first is number 1."""
-        keys = self._branch_keys(run, np.full(np.shape(run), number))
-        return self._begin_ns[run, number - 1], _RunStream(self._rounds_of_all.take(keys, axis=2))
+    def branch_start_and_stream(self, run: IntArray, number: int) -> tuple[IntArray, "Stream"]:
+        """Return when branch `number` (from 1) of runs begins, ns, and the stream of its draws."""
+        keys = self._branch_key_indices(run, np.full(np.shape(run), number))
+        return self._begin_ns[run, number - 1], _RunStream(
+            self._round_keys_of_all.take(keys, axis=2)
+        )
 
-    def _branch_keys(self, run: IntArray, number: IntArray) -> IntArray:
-        """Return which keys are those of branches of runs; number 0 is the run itself."""
+    def _branch_key_indices(self, run: IntArray, number: IntArray) -> IntArray:
+        """Return the indices among the keys of the branches of runs; number 0 is the run itself."""
         later = len(self._begin_ns) + run * self.branches + number - 1
         return np.where(number > 0, later, run)
 
     @cached_property
-    def _rounds_of_all(self) -> UInt64Array:
-        """The keys of all ten rounds (rounds, 2, runs): rows take those of their runs."""
+    def _round_keys_of_all(self) -> UInt64Array:
+        """The keys of all ten rounds for every run and branch, (rounds, 2, keys)."""
         both, bumps = np.array([self._keys & _U_LOW, self._keys >> _U32]), np.array(_BUMPS)
         rounds: UInt64Array = (both + bumps.astype(np.uint64)[:, :, np.newaxis]) & _U_LOW
         return rounds
@@ -204,7 +206,7 @@ class Stream:
         if not 0 <= draw < 2**16:
             raise ValueError(f"draw is {draw}: it must lie in [0, 65536)")
         if self._of_many:
-            self._draw_for_all()
+            self._note_draw_for_all()
         target = np.asarray(targets, dtype=np.uint64)
         numbers = np.asarray(scans, dtype=np.int64)
         # 48 bits of scan number: 280 trillion scans before a draw repeats.
@@ -232,7 +234,7 @@ class Stream:
         keys = np.asarray(self._round_keys, dtype=np.uint64)
         return _philox_of_arrays(counter, keys)
 
-    def _draw_for_all(self) -> None:
+    def _note_draw_for_all(self) -> None:
         self.drew_for_all = True
         if self.shared:
             raise ValueError(
@@ -267,7 +269,7 @@ class Stream:
     def normals(
         self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return three standard normal draws from one key, for who needs many of them.
+        """Return three independent standard normals from each key, for blocks that need many.
 
         They are made of 32 bits each, so none is larger than 6.7 in size. Of one (target, scan,
         draw) use either these or the others.
@@ -283,20 +285,20 @@ _KNOWN: UInt64Array = np.empty(0, dtype=np.uint64)
 
 
 class _RunStream(Stream):
-    """The draws of rows whose keys are known; their shape is that of targets or scans."""
+    """A stream with a known key for each row; draws have the shape of the targets or scans."""
 
     def __init__(self, round_keys: UInt64Array) -> None:
         self._keys, self._round_keys = _KNOWN, round_keys
 
 
 def _box_muller_radius(word: UInt64Array) -> FloatArray:
-    """Return Box and Muller's radius from 32 bits; 1 is added, so that the logarithm is finite."""
+    """Return the Box-Muller radius from 32 random bits, plus 1 so that the logarithm is finite."""
     radius: FloatArray = np.sqrt(-2.0 * np.log((word + 1.0) * 2.0**-32))
     return radius
 
 
 class Streams:
-    """All draws of a run, or of several runs with a seed each, by block and purpose."""
+    """All random streams of a run, or of several runs with a seed each, by block and purpose."""
 
     def __init__(self, seed: int | Sequence[int]) -> None:
         self.seed = seed if isinstance(seed, int) else seed[0]
@@ -305,23 +307,23 @@ class Streams:
         self._shared: set[str] = set()
 
     def stream(self, block: str, purpose: str) -> Stream:
-        """Return the stream of a block's purpose."""
+        """Return a block's stream of random numbers for a purpose, the same object each time."""
         if (block, purpose) not in self._made:
             self._made[block, purpose] = Stream(self._seeds, block, purpose)
             self._made[block, purpose].shared = block in self._shared
         return self._made[block, purpose]
 
     def has_drawn_for_all(self, block: str) -> bool:
-        """Whether a block drew with the seed of the first of several runs."""
+        """Return whether a block drew for several runs at once with the seed of the first."""
         return any(one.drew_for_all for (of, _), one in self._made.items() if of == block)
 
-    def share(self, block: str) -> None:
-        """Refuse from now on what a block draws without a word of runs."""
+    def forbid_draws_for_all(self, block: str) -> None:
+        """From now on raise an error if the block draws without saying for which runs."""
         self._shared.add(block)
         for (of, _), stream in self._made.items():
             stream.shared = stream.shared or of == block
 
     def scan_normals(self, block: str, purpose: str) -> Callable[[IntArray], FloatArray]:
-        """Return a function from scan numbers to standard normal draws (for clock jitter)."""
+        """Return a function from scan numbers to standard normal draws, for clock jitter."""
         stream = self.stream(block, purpose)
         return lambda scans: stream.normal(np.uint64(0), scans)

@@ -9,7 +9,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import IntArray
 from dsa_des.time.changing_clock import ChangingClock
 from dsa_des.time.clock import ClockSpec, ScanClock
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 #: Scan numbers, and when these scans are.
 Scans = tuple[IntArray, RunTicks]
@@ -21,7 +21,7 @@ _NOTHING = (0, 0, _NONE, _NONE, _NONE)
 
 
 class RunClock:
-    """One block's scans in every run, each of which has its own `specs`.
+    """One block's scan clocks in all runs, one for each of `specs`.
 
     Given a run's number, `jitter` returns the draws of its clock's jitter; with `always_draws` it
     draws also where that is 0. `changes` are from which ticks on the clocks are others, and the
@@ -61,12 +61,12 @@ class RunClock:
         self._none = (0, -1)  # no scan from the first of these ticks on lies before the second
 
     @property
-    def first(self) -> Any:
-        """The clock of the first run."""
+    def first_run_clock(self) -> Any:
+        """The scan clock of the first run."""
         return self._clocks[0]
 
     def between(self, start: int, end: int) -> Scans:
-        """Return the scans of the runs that go now, with start <= tick < end within each."""
+        """Return the scans, with start <= tick < end, of the runs that are being simulated."""
         if self._going != self._runs.going:
             self._going, self._last, self._read = self._runs.going, (0, -1, self._last[2]), _NOTHING
         # Several blocks ask for the same scans of a window, one after the other.
@@ -75,7 +75,7 @@ class RunClock:
         return self._last[2]
 
     def next_scan_bound(self, tick: int) -> int:
-        """Return a lower bound of the ticks of all runs' scans at or after `tick`."""
+        """Return a tick that is no later than any run's scan at or after `tick`: a lower bound."""
         if self._runs.count > 1 and not self._alike_at_once:
             return tick
         # Who asks goes on in time, and what was found holds up to there.
@@ -84,7 +84,7 @@ class RunClock:
         return max(tick, self._none[1])
 
     def previous_ticks(self, scans: IntArray, run: IntArray) -> IntArray:
-        """Return when the scan before each was, in ticks of its run; -1 before the first."""
+        """Return the tick of the scan before each given one in its run; -1 before the first."""
         if self._alike:
             shift = self._offsets[run] - self._clocks[0].offset
             return np.where(scans > 0, self._clocks[0].previous_ticks(scans) + shift, -1)
@@ -100,14 +100,14 @@ class RunClock:
         if self._alike:
             return self._scans_between_if_alike(start, end)
         if start < self._read[0] or end > self._read[1]:
-            self._read_ahead(start, end)
+            self._cache_scans_ahead(start, end)
         ticks, runs, numbers = self._read[2:]
         rows = slice(*np.searchsorted(ticks, [start, end]).tolist())
         order = np.argsort(runs[rows], kind="stable")
         return numbers[rows][order], RunTicks(runs[rows][order], ticks[rows][order])
 
-    def _read_ahead(self, start: int, end: int) -> None:
-        """Keep the scans of a while, in order of time: drawn ones are read clock by clock."""
+    def _cache_scans_ahead(self, start: int, end: int) -> None:
+        """Compute the scans of all running runs for some time ahead, kept in order of time."""
         until = max(end, min(start + round(_READ_SCANS * self.period), self._runs.run_ticks))
         scans_of_each = [self._clocks[run].between(start, until) for run in self._going]
         ticks = np.concatenate([ticks for _, ticks in scans_of_each])

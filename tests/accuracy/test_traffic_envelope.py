@@ -103,11 +103,11 @@ def test_requests_add_up_and_the_silent_want_everything() -> None:
 
 def test_a_tilted_sensor_sees_steeper_body_elevations() -> None:
     level = Reach((-1, 1), (-0.2, 0.3), 5000.0)
-    turned = SensorAxes((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).reach(level)
+    turned = SensorAxes((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).reach_in_body_axes(level)
     assert turned.steepest_rad == pytest.approx(0.3)
     tilted = SensorAxes((0.0, 0.4, 0.0), (0.0, 0.4, 0.0))
     _, elevation = tilted.to_body(np.linspace(-1, 1, 201), np.full(201, 0.3))
-    steepest_rad = tilted.reach(level).steepest_rad
+    steepest_rad = tilted.reach_in_body_axes(level).steepest_rad
     assert np.abs(elevation).max() <= steepest_rad + 1e-15 and steepest_rad == pytest.approx(0.7)
 
 

@@ -233,7 +233,8 @@ def test_a_bad_configuration_is_named(tmp_path):
 
 def test_alerts_are_offered_with_their_levels_and_scan_time():
     parameters = SimpleNamespace(
-        read=lambda: (None, SimpleNamespace(levels=[1, 2, 3])), scan_rate_hz=Fraction(5, 2)
+        read_configuration=lambda: (None, SimpleNamespace(levels=[1, 2, 3])),
+        scan_rate_hz=Fraction(5, 2),
     )
     offered = DaidalusAlerting.offer(SimpleNamespace(p=parameters), "alerts")
     assert (offered.levels, offered.period_s) == (3, 0.4)

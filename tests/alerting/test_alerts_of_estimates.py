@@ -142,7 +142,7 @@ def test_an_estimate_is_carried_on_with_its_covariance():
     # Before it came, when it did, and when a tentative one has come, which counts for nothing; one
     # that is carried on without looks counts.
     now = at(39, 40, 41, 42)
-    instant, number, state, wrong, age_s = flights.states(
+    instant, number, state, wrong, age_s = flights.states_at(
         now, np.full(4, 5.0), np.stack([place] * 4, axis=1)
     )
     assert (instant.tolist(), number.tolist()) == ([1, 3], [7, 9])
@@ -163,10 +163,10 @@ def test_what_came_in_another_run_is_not_known():
     both.tick, both.offsets = both.tick[:1], np.array([0, 2])
     flights.add(RunTicks(np.array([1, 2]), np.array([1, 3])), two(tracks(1), both))
     now = RunTicks(np.array([1, 1, 2, 2, 3]), np.array([0, 7, 1, 4, 9]))
-    instant, number, _, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
+    instant, number, _, _, _ = flights.states_at(now, np.full(5, 4.0), np.zeros((3, 5)))
     assert (instant.tolist(), number.tolist()) == ([1, 2, 3, 3], [1, 3, 2, 9])
-    flights.keep(np.array([True, False, True, True]))
-    instant, number, _, _, _ = flights.states(now, np.full(5, 4.0), np.zeros((3, 5)))
+    flights.keep_rows(np.array([True, False, True, True]))
+    instant, number, _, _, _ = flights.states_at(now, np.full(5, 4.0), np.zeros((3, 5)))
     assert (instant.tolist(), number.tolist()) == ([1, 3, 3], [1, 2, 9])
 
 
@@ -182,7 +182,7 @@ def test_a_track_of_which_nothing_has_come_for_long_is_refused():
         setattr(one, name, np.concatenate([getattr(one, name), getattr(other, name)]))
     one.covariance = {name: np.repeat(values, 2) for name, values in one.covariance.items()}
     flights.add(at(20), one)
-    instant, number, _, _, age_s = flights.states(
+    instant, number, _, _, age_s = flights.states_at(
         at(40, 41, 51), np.array([40.0, 41.0, 51.0]), np.zeros((3, 3))
     )
     assert (instant.tolist(), number.tolist()) == ([0, 0, 1], [1, 2, 2])
@@ -200,18 +200,18 @@ def test_tracks_are_remembered_by_run_and_number():
 
     def levels(runs, numbers, now_s, due, early):
         due, early = (np.array(part, dtype=bool)[:, np.newaxis] for part in (due, early))
-        found = memory.levels(np.array(runs), np.array(numbers), np.array(now_s), due, early)
+        found = memory.update_levels(np.array(runs), np.array(numbers), np.array(now_s), due, early)
         return found.tolist()
 
     # Track 5 of the first run is on and stays so by its early time; a new one needs its own.
     assert levels([0, 0, 0], [5, 6, 5], [0.0, 0.0, 1.0], [1, 0, 0], [1, 1, 1]) == [1, 0, 1]
     assert levels([0, 1], [4, 5], [1.0, 1.0], [0, 0], [1, 1]) == [0, 0]
-    memory.forget(np.array([1]), np.array([9.0]))
+    memory.forget_absent(np.array([1]), np.array([9.0]))
     assert len(memory) == 3
-    memory.forget(np.array([0, 1]), np.array([4.5, 4.5]))
+    memory.forget_absent(np.array([0, 1]), np.array([4.5, 4.5]))
     assert len(memory) == 2
     assert levels([0, 1], [5, 5], [5.0, 9.0], [0, 0], [1, 1]) == [1, 0]
     assert levels([0], [5], [9.1], [0], [1]) == [0]  # it was gone for longer than anything lasts
     assert levels([0], [5], [10.0], [1], [1]) == [1]
-    memory.forget_before(1)
+    memory.forget_runs_before(1)
     assert levels([0], [5], [11.0], [0], [1]) == [0]

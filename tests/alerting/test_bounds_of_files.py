@@ -8,7 +8,7 @@ import pytest
 
 import dsa_des
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.encounter import _bounds, read_encounter
+from components.alerting.encounter import _uncertainty_bounds, read_encounter
 from tests.alerting.conf_text import CONF
 
 SCORES = """
@@ -37,7 +37,7 @@ def test_bounds_are_those_of_both_aircraft(tmp_path: Path) -> None:
     own = {key: np.array([value]) for key, value in OWN.items()}
     targets = {key: np.array([[value]]) for key, value in OTHER.items()}
     relative = tuple(np.full((1, 1), 1000.0) for _ in range(6))
-    found = _bounds(read_conf(tmp_path / "a.conf"), own, targets, relative)
+    found = _uncertainty_bounds(read_conf(tmp_path / "a.conf"), own, targets, relative)
     wanted = (
         1.5 * (longest(OWN, "s") + longest(OTHER, "s")), 2.5 * (4.0 + 9.0),
         2.0 * (longest(OWN, "v") + longest(OTHER, "v")), 3.5 * (0.5 + 1.5),

@@ -46,13 +46,13 @@ RADAR = {"azimuth_error_deg": 0.05, "elevation_error_deg": 0.02, "range_error_m"
 @pytest.fixture
 def told(monkeypatch):
     """All messages of alerting blocks."""
-    messages, levels = [], DaidalusAlerting._levels
+    messages, levels = [], DaidalusAlerting._compute_alert_levels
 
     def kept(self, asked, wake):
         messages.append((asked.tick / wake.ticks_per_s, levels(self, asked, wake)))
         return messages[-1][1]
 
-    monkeypatch.setattr(DaidalusAlerting, "_levels", kept)
+    monkeypatch.setattr(DaidalusAlerting, "_compute_alert_levels", kept)
     return messages
 
 
@@ -292,7 +292,7 @@ def test_velocities_of_far_tracks_count_in_their_own_place():
     now = RunTicks.of_run(0, np.array([1]))
     flights.add(now, tracks(4, north_m=60e3, east_m=0.0, down_m=0.0, north_m_s=north,
                             east_m_s=east, down_m_s=-up))  # fmt: skip
-    _, _, state, _, _ = flights.states(now, np.array([3.0]), place[:, np.newaxis])
+    _, _, state, _, _ = flights.states_at(now, np.array([3.0]), place[:, np.newaxis])
     assert abs(up) > 0.7
     assert state[5, 0] == pytest.approx(0.0, abs=1e-6)
     assert state[4, 0] == pytest.approx(80.0, rel=0.01)

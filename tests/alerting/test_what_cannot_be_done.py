@@ -11,13 +11,13 @@ from same_runs import replicas_of
 from wired import SEES_ALL, chain
 
 import dsa_des
-from components.display.terminal import show
+from components.display.terminal import print_run_summary
 from dsa_des.cli import main
 from dsa_des.record.failure_counts import add_counts, failure_sentences
 from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
-from dsa_des.terminal.terminal import text_of
+from dsa_des.terminal.terminal import capture_text
 from tests.alerting.conf_text import CONF
 
 TARGETS = [
@@ -92,7 +92,7 @@ def test_the_summary_says_it_with_its_share(tmp_path: Path) -> None:
     run = dsa_des.run(alone(tmp_path, scan_rate_hz="1/20"))
     assert run.summary["undone"] == {"alerting": {NO_VELOCITY: (2, 4)}}
     said = f"alerting: {NO_VELOCITY}: 2 of 4 (50 %)"
-    assert said in text_of(lambda console: show(console, run.summary))
+    assert said in capture_text(lambda console: print_run_summary(console, run.summary))
     assert "undone" not in dsa_des.run(alone(tmp_path)).summary  # 2 of 60 is no news
 
 

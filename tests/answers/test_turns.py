@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from dsa_des.answers.alternatives import Alternative, add_model_axis
-from dsa_des.answers.models_in_turns import TurnTimes, split_into_turns
+from dsa_des.answers.models_in_turns import TurnTimes, split_into_batches
 from dsa_des.studies.study_file import read_study
 
 CONFIGS = Path(__file__).parents[2] / "configs"
@@ -43,7 +43,7 @@ def study_of(folder, replicas, chunk, over=""):
 )
 def test_all_runs_are_in_one_turn(tmp_path, replicas, chunk, many, over, turns):
     study = study_of(tmp_path, replicas, chunk, over)
-    batches = split_into_turns(study, many)
+    batches = split_into_batches(study, many)
     assert len(batches) == turns
     runs = Counter((cell, k) for batch in batches for cell, start, end in batch
                    for k in range(start, end))  # fmt: skip
@@ -55,7 +55,7 @@ def test_all_runs_are_in_one_turn(tmp_path, replicas, chunk, many, over, turns):
 def test_members_of_a_sample_are_kept_whole(tmp_path):
     """Both scan rates meet an encounter in the same turn."""
     study = study_of(tmp_path, 2, 4, "'traffic.intruders[0].north_m'")
-    for batch in split_into_turns(study):
+    for batch in split_into_batches(study):
         cells = {cell for cell, _, _ in batch}
         assert {cell + 7 if cell < 7 else cell - 7 for cell in cells} == cells
 
@@ -66,8 +66,8 @@ def test_a_time_is_taken_by_that_of_the_same_turn():
     for turn, slow in enumerate((1.0, 2.0, 1.0)):
         for model, cpu_s in enumerate((1.0, 0.5, 3.0)):
             times.cpu_s[turn, model], times.runs[turn, model] = slow * cpu_s, 10
-    assert times.of_own(1) == (0.5, 0.0)
-    assert times.of_own(2) == pytest.approx((3.0, 0.0))
-    assert times.per_run_ms(0)[0] == 100.0
+    assert times.cpu_ratio_to_own(1) == (0.5, 0.0)
+    assert times.cpu_ratio_to_own(2) == pytest.approx((3.0, 0.0))
+    assert times.cpu_ms_per_run(0)[0] == 100.0
     del times.cpu_s[1, 0]  # interrupted: that turn has nothing to be held against
-    assert times.of_own(1) == (0.5, 0.0)
+    assert times.cpu_ratio_to_own(1) == (0.5, 0.0)

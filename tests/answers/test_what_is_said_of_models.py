@@ -54,7 +54,7 @@ def test_the_sentences_decide_first_and_name_everyone(report: AnswerReport) -> N
 
 
 def test_the_table_has_a_line_for_each_model(report: AnswerReport) -> None:
-    rows = {row[0]: row[1:] for row in report.cells("range_m")}
+    rows = {row[0]: row[1:] for row in report.table_rows("range_m")}
     assert rows["as it is"][0] == "30 ms a run"
     assert rows["near"] == ["0.5", "5", "-5 to 15", "", "60 of 60", "within, front"]
     assert rows["twin"][-2:] == ["0 of 60", "same"]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dsa_des.arrays.keyed_table import KeyedTable, occurrences_by_turn
+from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
 
 
 def a_table(rows):
@@ -45,7 +45,7 @@ def test_what_is_kept_is_what_a_table_of_each_run_keeps(seed):
 
 def test_rows_of_a_run_are_continued_where_there_are_any_and_copied():
     old, new = a_table([(1, 5, 7), (3, 5, 8)]), a_table([(0, 0, 0), (1, 0, 0), (3, 0, 0)])
-    found = old.latest_or_new(new)
+    found = old.kept_rows_or_new(new)
     assert rows_of(found) == [(0, 0, 0), (1, 5, 7), (3, 5, 8)]
     found.thing[:] = 9  # nobody else's
     assert old.thing.tolist() == [5, 5] and new.thing.tolist() == [0, 0, 0]
@@ -62,5 +62,5 @@ def test_things_are_put_in_order_of_runs_and_keep_their_order_within():
 )
 def test_every_key_has_its_turn(keys, expected):
     assert [
-        rows.tolist() for rows in occurrences_by_turn(np.array(keys, dtype=np.int64))
+        rows.tolist() for rows in indices_by_occurrence(np.array(keys, dtype=np.int64))
     ] == expected

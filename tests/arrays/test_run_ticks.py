@@ -7,12 +7,12 @@ from hypothesis import strategies as st
 
 from dsa_des.arrays.run_ticks import (
     RunTicks,
-    first_position_in_run,
-    is_single_run,
-    last_position_in_run,
-    next_position_in_run,
+    first_position_at_or_after,
+    first_position_in_runs,
+    is_shared_single_run,
+    last_position_at_or_before,
     rank_instants,
-    runs_of_single,
+    single_run_numbers,
     union_of_instants,
 )
 
@@ -33,7 +33,7 @@ def as_list(instants):
 @settings(derandomize=True, deadline=None, max_examples=200)
 @given(known=pairs.map(sorted), asked=pairs.map(sorted), scale=scales)
 def test_the_last_of_its_own_run(known, asked, scale):
-    rows = last_position_in_run(of(known, scale), of(asked, scale))
+    rows = last_position_at_or_before(of(known, scale), of(asked, scale))
     for (run, tick), row in zip(asked, rows.tolist(), strict=True):
         there = [k for k, (other, t) in enumerate(known) if other == run and t <= tick]
         assert row == (there[-1] if there else -1)
@@ -43,9 +43,9 @@ def test_the_last_of_its_own_run(known, asked, scale):
 @given(known=pairs.map(sorted), asked=pairs, scale=scales)
 def test_the_first_at_or_after(known, asked, scale):
     instants = of(known, scale)
-    rows = next_position_in_run(instants, of(asked, scale))
+    rows = first_position_at_or_after(instants, of(asked, scale))
     assert rows.tolist() == [sum(one < pair for one in known) for pair in asked]
-    of_run = first_position_in_run(instants, np.array([run for run, _ in asked], dtype=np.int64))
+    of_run = first_position_in_runs(instants, np.array([run for run, _ in asked], dtype=np.int64))
     assert of_run.tolist() == [sum(one[0] < run for one in known) for run, _ in asked]
     assert [instants.count_before(run, tick * scale) for run, tick in asked] == rows.tolist()
 
@@ -72,7 +72,7 @@ def test_union_order_and_ranks(parts, scale):
 @given(scale=scales, found=pairs)
 def test_the_newest_so_far_of_each_run(found, scale):
     found = sorted(found, key=lambda pair: pair[0])
-    newest = of(found, scale).newest()
+    newest = of(found, scale).running_latest()
     for k, (run, _) in enumerate(found):
         so_far = max(t for other, t in found[: k + 1] if other == run)
         assert newest.tick[k] == scale * so_far
@@ -84,16 +84,16 @@ def test_where_runs_begin_and_end(found):
     instants, runs = of(found), sorted({run for run, _ in found})
     firsts = [min(k for k, (other, _) in enumerate(found) if other == run) for run in runs]
     lasts = [max(k for k, (other, _) in enumerate(found) if other == run) for run in runs]
-    assert instants.first_of_each.tolist() == firsts
-    assert instants.last_of_each.tolist() == lasts
+    assert instants.first_position_of_runs.tolist() == firsts
+    assert instants.last_position_of_runs.tolist() == lasts
     assert instants.is_one_run == (len(runs) <= 1)
 
 
 @pytest.mark.parametrize("rows", [slice(1, 3), np.array([2, 0]), np.array([True, False, True])])
 def test_a_single_run_needs_no_column(rows):
     instants = RunTicks.of_run(0, np.array([4, 5, 9]))
-    assert is_single_run(instants.run) and is_single_run(instants.take(rows).run)
+    assert is_shared_single_run(instants.run) and is_shared_single_run(instants.take(rows).run)
     joined = RunTicks.concatenate([instants, instants])
-    assert is_single_run(joined.run) and joined.run.tolist() == [0] * 6
-    assert not is_single_run(RunTicks.of_run(2, np.array([4])).run)
-    assert runs_of_single(0).tolist() == []
+    assert is_shared_single_run(joined.run) and joined.run.tolist() == [0] * 6
+    assert not is_shared_single_run(RunTicks.of_run(2, np.array([4])).run)
+    assert single_run_numbers(0).tolist() == []

@@ -5,9 +5,9 @@ import pytest
 
 from dsa_des.arrays.run_ticks import (
     RunTicks,
-    last_position_in_run,
-    positions_among,
-    runs_of_single,
+    last_position_at_or_before,
+    positions_with_found_mask,
+    single_run_numbers,
     union_of_instants,
 )
 from dsa_des.arrays.sorted_union import sorted_union
@@ -40,7 +40,7 @@ def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
             run = np.sort(random.integers(0, runs, 40))
             tick = random.integers(0, 60, 40)
             order = np.lexsort((tick, run))
-            known = RunTicks(runs_of_single(40) if runs == 1 else run, tick[order])
+            known = RunTicks(single_run_numbers(40) if runs == 1 else run, tick[order])
             parts.append(known)
         every = union_of_instants(parts)
         pairs = list(zip(every.run.tolist(), every.tick.tolist(), strict=True))
@@ -51,11 +51,13 @@ def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
             twin = RunTicks(part.run, part.tick.copy())
             asked = list(zip(part.run.tolist(), part.tick.tolist(), strict=True))
             for instants in (part, twin):
-                assert last_position_in_run(every, instants).tolist() == [
+                assert last_position_at_or_before(every, instants).tolist() == [
                     pairs.index(p) for p in asked
                 ]
-                place, there = positions_among(every, instants)
+                place, there = positions_with_found_mask(every, instants)
                 assert there is None
                 assert [pairs[row] for row in place.tolist()] == asked
         with pytest.raises(ValueError, match="read-only"):
-            last_position_in_run(every, parts[0])[0] = 7  # the next who asks is given the same
+            last_position_at_or_before(every, parts[0])[0] = (
+                7  # the next who asks is given the same
+            )

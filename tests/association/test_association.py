@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.association.assignment import gate_threshold, global_nearest, nearest
+from components.association.assignment import gate_threshold, global_nearest_pairs, nearest_pairs
 from components.association.jpda import exact_marginals, marginals, propagate_beliefs
 
 
@@ -97,7 +97,7 @@ def test_the_global_assignment_costs_least_and_the_nearest_goes_in_turn():
         }
         track, detection = (np.array([k[i] for k in cost], dtype=int) for i in (0, 1))
         distance = np.array(list(cost.values()))
-        taken = global_nearest(track, detection, distance, gate)
+        taken = global_nearest_pairs(track, detection, distance, gate)
         assert len(set(track[taken])) == len(set(detection[taken])) == len(taken)
         total = distance[taken].sum() + gate * (tracks - len(taken))
         assert total == pytest.approx(best(tracks, detections, cost, gate))
@@ -106,7 +106,7 @@ def test_the_global_assignment_costs_least_and_the_nearest_goes_in_turn():
             if ("t", pair[0]) not in used and ("d", pair[1]) not in used:
                 near.append(pair)
                 used |= {("t", pair[0]), ("d", pair[1])}
-        got = nearest(track, detection, distance)
+        got = nearest_pairs(track, detection, distance)
         assert sorted(zip(track[got], detection[got], strict=True)) == sorted(near)
         greedy_lost += distance[got].sum() + gate * (tracks - len(got)) > total + 1e-9
     assert greedy_lost > 0
@@ -121,7 +121,7 @@ def test_the_global_assignment_lives_with_costs_below_zero():
             continue
         cost = rng.uniform(0.0, 9.0, len(track)) - 28.0
         price = 11.0 - 28.0
-        taken = global_nearest(track, detection, cost, price)
+        taken = global_nearest_pairs(track, detection, cost, price)
         assert len(set(track[taken])) == len(set(detection[taken])) == len(taken)
         total = cost[taken].sum() + price * (len(set(track)) - len(taken))
         known = dict(zip(zip(track.tolist(), detection.tolist(), strict=True), cost, strict=True))
@@ -136,4 +136,4 @@ def test_a_wide_gate_takes_no_detection_from_a_narrow_one():
     track, detection = np.array([wide, narrow]), np.array([0, 0])
     cost = np.array([1.0 + 6.0, 2.0 - 6.0])  # squared distance and ln|S|
     price = np.array([9.0 + 6.0, 9.0 - 6.0])  # the gate and ln|S|
-    assert track[global_nearest(track, detection, cost, price)].tolist() == [narrow]
+    assert track[global_nearest_pairs(track, detection, cost, price)].tolist() == [narrow]

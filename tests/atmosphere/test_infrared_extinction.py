@@ -8,9 +8,9 @@ import pytest
 
 from components.atmosphere.infrared import (
     band_extinction_per_m,
-    check_band,
+    band_wavelengths_um,
     continuum_per_km,
-    haze_share,
+    haze_extinction_ratio,
     long_wave_transmission,
     mid_wave_transmission,
     precipitable_water_mm,
@@ -80,7 +80,7 @@ def test_haze_takes_less_of_long_waves_and_fog_the_same():
     km = np.array([80.0, 20.0, 3.0, 0.8, 0.3])
     q = np.array([1.6, 1.3, 0.16 * 3 + 0.34, 0.3, 0.0])
     for band, middle in (("mwir", 4.0), ("lwir", 10.0)):
-        np.testing.assert_allclose(haze_share(1e3 * km, band), (middle / 0.55) ** -q)
+        np.testing.assert_allclose(haze_extinction_ratio(1e3 * km, band), (middle / 0.55) ** -q)
     assert band_extinction_per_m("lwir") == 0.0
     both = band_extinction_per_m("mwir", haze_visibility_m=2e4, rain_extinction_per_m=1e-4)
     assert both == pytest.approx(1e-4 + 3.912 / 2e4 * (4 / 0.55) ** -1.3)
@@ -88,9 +88,9 @@ def test_haze_takes_less_of_long_waves_and_fog_the_same():
 
 def test_bad_arguments_are_named():
     with pytest.raises(ValueError, match="band is 'swir': it must be one of mwir, lwir"):
-        check_band("swir")
+        band_wavelengths_um("swir")
     with pytest.raises(ValueError, match="visibility_m must be above 0"):
-        haze_share(0.0, "mwir")
+        haze_extinction_ratio(0.0, "mwir")
     with pytest.raises(ValueError, match="range_m"):
         long_wave_transmission(-1.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="water_mm"):

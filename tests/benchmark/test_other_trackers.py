@@ -5,27 +5,27 @@ import pytest
 
 from components.benchmark.track_updates import (
     LOOKS,
-    _looks,
+    _recorded_scans,
     _start_tracks,
-    make_listening,
     plain_looks,
-    plain_updates,
-    stone_soup_updates,
+    prepare_plain_updates,
+    prepare_stone_soup_updates,
+    record_tracker_inputs,
     track_plainly,
 )
 from components.messages.state_tracks import COVARIANCE
 
 
 def test_the_plain_loop_comes_to_the_states_of_our_tracker():
-    block = make_listening(1, 4)
-    scans, places = _looks(block)
+    block = record_tracker_inputs(1, 4)
+    scans, places = _recorded_scans(block)
     looks = plain_looks(scans, places, block.context.ticks_per_s)
     assert sorted({look.measured.shape[1] for look in looks}) == [2, 3] and len(looks) == LOOKS
     first = _start_tracks(scans, places, block.p.start_speed_m_s)
     states, covariances = track_plainly(
         looks[1:], *first, block.p.acceleration_intensity_m2_s3, looks[0].time_s
     )
-    ours, spreads = block._store.states()[0], block._store.covariances()[0]
+    ours, spreads = block._store.states_by_model()[0], block._store.covariances_by_model()[0]
     assert ours.shape == (6, 4) and len(COVARIANCE) == 21
     for k in range(4):
         j = int(np.argmin([np.abs(s[:3] - ours[:3, k]).max() for s in states]))
@@ -34,7 +34,7 @@ def test_the_plain_loop_comes_to_the_states_of_our_tracker():
 
 
 def test_updates_are_counted_and_done():
-    count, track = plain_updates(2)
+    count, track = prepare_plain_updates(2)
     assert count == 2 * (LOOKS - 1)
     states, _ = track()
     assert len(states) == 2
@@ -42,6 +42,6 @@ def test_updates_are_counted_and_done():
 
 def test_stone_soup_tracks_the_same_detections():
     pytest.importorskip("stonesoup", reason="needs the extra stonesoup")
-    count, track = stone_soup_updates(2)
+    count, track = prepare_stone_soup_updates(2)
     assert count == 2 * 26
     track()

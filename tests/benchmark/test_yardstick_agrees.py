@@ -3,7 +3,7 @@
 import pytest
 
 from components.benchmark import yardstick
-from components.benchmark.scenes import CASES, replicas_of, scene_of
+from components.benchmark.scenes import CASES, load_case_scene, random_phase_replicas
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -16,9 +16,9 @@ SHORT = {
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_yardstick_finds_the_same(case):
-    scene = scene_of(case, quick=False, duration_s=SHORT[case.name])
+    scene = load_case_scene(case, quick=False, duration_s=SHORT[case.name])
     if case.replicas:
-        scene = replicas_of(scene, 2)[1]
+        scene = random_phase_replicas(scene, 2)[1]
     sink = MemorySink()
     simulation = Simulation(scene, recorder=Recorder([sink]))
     simulation.run()
@@ -42,10 +42,10 @@ def test_yardstick_finds_the_same(case):
 
 def test_the_replicas_of_the_benchmark_run_together_and_share_their_blocks():
     """With other phases of three clocks; no truth is recorded of so many."""
-    from components.benchmark.scenes import replicas_of, scene_of, select_cases
+    from components.benchmark.scenes import load_case_scene, random_phase_replicas, select_cases
     from dsa_des.replicas.lockstep import make_lockstep_simulation
 
     (case,) = select_cases(["monte_carlo"])
-    scene = scene_of(case, quick=False, duration_s="2")
-    simulation = make_lockstep_simulation(replicas_of(scene, 3))
+    scene = load_case_scene(case, quick=False, duration_s="2")
+    simulation = make_lockstep_simulation(random_phase_replicas(scene, 3))
     assert not simulation.timeline.split

@@ -16,7 +16,7 @@ from dsa_des.block.message import (
     Text,
     column,
     columns,
-    columns_of,
+    columns_of_dataclass,
     per_row,
     static,
 )
@@ -183,7 +183,7 @@ def test_groups_of_columns_come_behind_a_class_s_own_and_before_dicts():
         number: np.ndarray = column("", "", "its number", "int64", default=None, kw_only=True)
 
     assert list(Sized.recorded["sizes"]) == ["number", "length_m", "width_m", "depth_m"]
-    assert columns_of(Size)["length_m"] == Column("m", "", "its length")
+    assert columns_of_dataclass(Size)["length_m"] == Column("m", "", "its length")
     made = Sized(np.array([5]), np.array([0, 2]), {}, length_m=np.array([1.0, 2.0]))
     assert np.isnan(made.width_m).all() and made.number.tolist() == [0, 0]
     empty = Sized.empty()

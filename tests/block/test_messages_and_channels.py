@@ -113,10 +113,10 @@ def test_a_channel_hands_each_row_over_once_and_not_before_it_arrives():
     came, message = channel.collect(20)
     assert came.tick.tolist() == [0, 10] and message.value.tolist() == [0, 1]
     assert channel.collect(20) is None
-    assert channel.next_arrivals(41).tick.tolist() == [20, 30, 40]
+    assert channel.arrivals_before(41).tick.tolist() == [20, 30, 40]
     came, message = channel.collect(41)
     assert came.tick.tolist() == [20, 30, 40] and message.value.tolist() == [2, 3, 4]
-    assert channel.next_arrivals(10**6).tick.tolist() == []
+    assert channel.arrivals_before(10**6).tick.tolist() == []
 
 
 def test_what_is_superseded_before_anybody_can_ask_is_forgotten():
@@ -125,7 +125,7 @@ def test_what_is_superseded_before_anybody_can_ask_is_forgotten():
     for part in (beats([0, 10]), beats([20, 21], start=2), beats([30, 40], start=4)):
         channel.push(part)
         whole.push(part)
-        channel.forget(25)
+        channel.drop_superseded_rows(25)
     assert len(channel.state()[0]) == 2  # that of 0 and 10 is gone
     asked = at([25, 35, 40])
     (got, rows), (expected, places) = channel.sample(asked, 50), whole.sample(asked, 50)
@@ -154,7 +154,7 @@ def test_sampling_holds_the_last_arrived_row():
 
 def test_what_a_channel_holds_before_the_first_row():
     channel = Channel("radar")
-    channel.hold(beats([0], start=9), 0)
+    channel.set_held_message(beats([0], start=9), 0)
     channel.push(beats([10]))
     message, rows = channel.sample(at([0, 9, 10]), 11)
     assert message.value[rows].tolist() == [9, 9, 0]
@@ -197,10 +197,14 @@ def test_a_simulation_that_has_run_says_that_it_runs_once(lab):
 def test_a_wake_without_a_clock_has_no_scans_before_it():
     instants = RunTicks(np.array([0, 0, 1]), np.array([3, 7, 5]))
     wake = Wake(instants, np.array([0, 1, 0]), 10, {}, {})
-    assert wake.scans_before.tolist() == [-1, -1, -1] and wake.time_s.tolist() == [0.3, 0.7, 0.5]
+    assert wake.previous_scan_tick.tolist() == [-1, -1, -1] and wake.time_s.tolist() == [
+        0.3,
+        0.7,
+        0.5,
+    ]
     asked = []
     clocked = Wake(
         instants, np.array([4, 5, 9]), 10, {}, {},
         clock=lambda scans, runs: asked.append((scans, runs)) or 100 * runs + scans - 1,
     )  # fmt: skip
-    assert clocked.scans_before.tolist() == [3, 4, 108] and len(asked) == 1
+    assert clocked.previous_scan_tick.tolist() == [3, 4, 108] and len(asked) == 1

@@ -5,7 +5,7 @@ from pathlib import Path
 from dsa_des.block.entry_points import COMPONENTS, entry_points_of
 from dsa_des.block.registry import find_component
 from dsa_des.evidence.case import read_case
-from dsa_des.evidence.inputs import models_of, verified_of
+from dsa_des.evidence.inputs import models_of, verifications_of_class
 
 ROOT = Path(__file__).parents[2]
 
@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[2]
 def test_every_claim_names_a_test_that_is_there():
     claims = {}
     for name in entry_points_of(COMPONENTS):
-        claims |= {(name, one.what): one for one in verified_of(find_component(name))}
+        claims |= {(name, one.what): one for one in verifications_of_class(find_component(name))}
     assert len(claims) >= 12
     for one in claims.values():
         assert (ROOT / one.test).is_file(), one
@@ -27,5 +27,5 @@ def test_the_shipped_case_states_something_of_every_block():
 
 
 def test_a_sensor_is_held_to_what_all_sensors_are():
-    what = [one.what for one in verified_of(find_component("radar.range_boundary"))]
+    what = [one.what for one in verifications_of_class(find_component("radar.range_boundary"))]
     assert "field of view and range" in what

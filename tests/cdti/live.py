@@ -10,12 +10,12 @@ from websockets.sync.client import connect
 
 from components.cdti import control as control_module
 from components.cdti import session as session_module
-from components.examples import folder
+from components.examples import configs_folder
 from tests.support.waiting import WAIT_S, wait_for
 
 #: Of the session's tracker, whose first track is that of the intruder's direction.
 TRACKS = 1_000_000
-SCENE = str(folder() / "operator" / "session.toml")
+SCENE = str(configs_folder() / "operator" / "session.toml")
 #: Begun when the camera already sees the intruder, and without what no test looks at.
 LATER = (
     "blocks.traffic.intruders[0].east_m=4200", "blocks.traffic.intruders[0].north_m=3500",

@@ -6,9 +6,9 @@ import pytest
 from click.testing import CliRunner
 
 from components.cdti.command import cdti
-from components.examples import folder
+from components.examples import configs_folder
 
-SCENE = str(folder() / "operator" / "session.toml")
+SCENE = str(configs_folder() / "operator" / "session.toml")
 
 
 def call(*words):

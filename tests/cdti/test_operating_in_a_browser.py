@@ -13,7 +13,7 @@ pytest.importorskip("websockets", reason="needs the package websockets")
 from live import SCENE, Session
 from screen import SETS, Screen, chromium
 
-from components.examples import folder
+from components.examples import configs_folder
 
 browser = chromium
 FOOT, KNOT, MILE = 0.3048, 1852 / 3600, 1852
@@ -47,7 +47,7 @@ def operated(browser, tmp_path_factory):
     """A page with alerts on it; the scene stands but for what is decided."""
     with pytest.MonkeyPatch.context() as patch:
         place = tmp_path_factory.mktemp("operated")
-        aircraft = folder() / "aircraft" / "general_aviation_fitted.toml"
+        aircraft = configs_folder() / "aircraft" / "general_aviation_fitted.toml"
         (place / "two.toml").write_text(TWO.format(session=SCENE, long=LONG, aircraft=aircraft))
         sets = (
             *SETS[2:],

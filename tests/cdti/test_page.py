@@ -21,11 +21,11 @@ from components.cdti.page import (
 
 def test_the_first_page_decides_and_the_second_watches():
     door = Admission()
-    role, key = door.role(door.token, "")
+    role, key = door.role_and_key(door.token, "")
     assert role == OPERATOR and len(key) >= 32
-    assert door.role(door.token, "") == (WATCHER, "")
-    assert door.role(door.token, "guess") == (WATCHER, "")
-    assert door.role(door.token, key) == (OPERATOR, key)  # the same page, loaded again
+    assert door.role_and_key(door.token, "") == (WATCHER, "")
+    assert door.role_and_key(door.token, "guess") == (WATCHER, "")
+    assert door.role_and_key(door.token, key) == (OPERATOR, key)  # the same page, loaded again
 
 
 def test_a_token_is_of_one_run_and_not_to_be_guessed():
@@ -40,13 +40,13 @@ def test_a_token_is_of_one_run_and_not_to_be_guessed():
 def test_a_new_address_decides_where_the_old_one_no_longer_does():
     door = Admission()
     old = door.token
-    assert door.renew() == old  # nobody has come yet
-    _, key = door.role(old, "")
-    new = door.renew()
-    assert new != old and door.renew() == new
-    assert door.role(old, "") == (WATCHER, "")
-    assert door.role(new, "")[0] == OPERATOR
-    assert door.role(old, key) == (WATCHER, "")  # who comes back late has lost its place
+    assert door.renew_token() == old  # nobody has come yet
+    _, key = door.role_and_key(old, "")
+    new = door.renew_token()
+    assert new != old and door.renew_token() == new
+    assert door.role_and_key(old, "") == (WATCHER, "")
+    assert door.role_and_key(new, "")[0] == OPERATOR
+    assert door.role_and_key(old, key) == (WATCHER, "")  # who comes back late has lost its place
     assert door.is_token(old) and door.is_token(new)
 
 

@@ -41,7 +41,7 @@ def watched(tmp_path, change=("", "")):
     recorder = Recorder([MemorySink()])
     simulation = Simulation(dsa_des.load_scene(path), recorder=recorder)
     scope = Scope(simulation)
-    recorder.listeners.append(scope.listen)
+    recorder.listeners.append(scope.store_message)
     simulation.run()
     return scope
 

@@ -72,7 +72,7 @@ def attitude(name):
 def test_the_newest_picture_of_the_chosen_contact_is_shown(seen):
     scope, contact, found = seen
     for name, sensor in (("turning", "eye"), ("rolling", "again"), ("below", "eye")):
-        shown = scope.camera(scope.picture(DURATION_S), DURATION_S, contact[name])
+        shown = scope.camera_picture(scope.picture(DURATION_S), DURATION_S, contact[name])
         detected = found[sensor, name]
         assert (shown["target"], shown["sensor"]) == (contact[name], sensor)
         assert shown["age"] == pytest.approx(DURATION_S - detected["time_s"], abs=0.006)
@@ -92,11 +92,13 @@ def test_only_a_camera_s_detections_with_their_pixels_are_pictures():
     )  # fmt: skip
     sights = CameraSights({"eye": object.__new__(ElectroOptical), "other": object()})
     sights.states = SimpleNamespace(columns=np.array([0]))
-    sights.take("other", message, 10)
+    sights.store_detections("other", message, 10)
     assert sights.picture(0, None, 1.0, None) is None
-    sights.take("eye", SimpleNamespace(**{**vars(message), "extras": {}}), 10)
+    sights.store_detections("eye", SimpleNamespace(**{**vars(message), "extras": {}}), 10)
     assert sights.picture(0, None, 1.0, None) is None
-    sights.take("eye", SimpleNamespace(**{**vars(message), "target": np.array([-1])}), 10)
+    sights.store_detections(
+        "eye", SimpleNamespace(**{**vars(message), "target": np.array([-1])}), 10
+    )
     assert sights.picture(0, None, 1.0, None) is None
 
 
@@ -104,7 +106,7 @@ def test_only_a_camera_s_detections_with_their_pixels_are_pictures():
 def test_wings_lie_on_the_picture_as_they_are_seen(seen, name, sensor):
     """Corners of the plate, turned from the target's axes into the camera's, as angles."""
     scope, contact, found = seen
-    shown = scope.camera(scope.picture(DURATION_S), DURATION_S, contact[name])
+    shown = scope.camera_picture(scope.picture(DURATION_S), DURATION_S, contact[name])
     detected = found[sensor, name]
     middle = detected["azimuth_rad"], detected["elevation_rad"]
     centre = detected["true_range_m"] * crooked.direction(*middle)
@@ -126,7 +128,7 @@ def test_the_horizon_is_where_it_is_and_stands_askew(seen):
     """Along the line on the picture, lines of sight touch the Earth."""
     scope, contact, found = seen
     picture = scope.picture(DURATION_S)
-    shown = scope.camera(picture, DURATION_S, contact["turning"])
+    shown = scope.camera_picture(picture, DURATION_S, contact["turning"])
     detected = found["eye", "turning"]
     tilt = math.radians(shown["tilt"])
     assert 1.0 < abs(shown["horizon"]) < 100.0 and abs(shown["tilt"]) > 10.0
@@ -138,7 +140,9 @@ def test_the_horizon_is_where_it_is_and_stands_askew(seen):
         azimuth = detected["azimuth_rad"] + right * PIXEL_RAD["eye"][0] / math.cos(elevation)
         line = crooked.attitude(crooked.OWNSHIP).T @ crooked.direction(azimuth, elevation)
         assert crooked.angles(line)[1] == pytest.approx(-dip, abs=math.radians(0.02))
-    behind = {n: scope.camera(picture, DURATION_S, c)["background"] for n, c in contact.items()}
+    behind = {
+        n: scope.camera_picture(picture, DURATION_S, c)["background"] for n, c in contact.items()
+    }
     assert behind == {"turning": "sky", "rolling": "sky", "below": "ground"}
 
 
@@ -146,7 +150,7 @@ def test_an_old_picture_is_of_a_target_and_of_no_track(seen):
     """Who was seen where a track now is may have been anybody."""
     scope, contact, _ = seen
     for name, number in contact.items():
-        later = scope.camera(scope.picture(DURATION_S + 3.0), DURATION_S + 3.0, number)
+        later = scope.camera_picture(scope.picture(DURATION_S + 3.0), DURATION_S + 3.0, number)
         assert (later is None) is (number >= 1_000_000), name
 
 
@@ -163,7 +167,7 @@ def test_a_camera_that_renders_shows_the_patch_that_it_searched():
     )  # fmt: skip
     scope, recorded = displayed(scene)
     picture = scope.picture(1.0)
-    shown = scope.camera(picture, 1.0, picture["contacts"][0][0])
+    shown = scope.camera_picture(picture, 1.0, picture["contacts"][0][0])
     patch = np.array(shown["patch"])
     assert shown["contrast"] is None
     middle = len(patch) // 2

@@ -146,7 +146,7 @@ def test_bands_are_shown_in_degrees_and_m_until_they_are_old(shown):
 
 def test_what_was_heard_by_an_instant_is_shown_whatever_comes_later(shown):
     scope, _, _ = shown
-    received, before = scope.take_received(), scope.picture(DURATION_S)
+    received, before = scope.received_so_far(), scope.picture(DURATION_S)
     late = copy(scope)
     late._contacts, late._alerts, late._bands = None, None, None
     assert late.picture(DURATION_S)["contacts"] == [] != before["contacts"]
@@ -164,8 +164,8 @@ def test_the_display_says_where_a_command_leads_and_of_which_alert_a_contact_is(
     )
     assert scope.commanded_value("climb", -150.0) == pytest.approx(own["alt"] - 150.0, abs=0.11)
     last = {r["target"]: r["level"] for r in recorded["alerts"] if r["time_s"] == 8.0}
-    assert {name: scope.level_of(contact[name]) for name in TARGETS} == last
-    assert scope.level_of(77) == 0
+    assert {name: scope.alert_level_of(contact[name]) for name in TARGETS} == last
+    assert scope.alert_level_of(77) == 0
 
 
 def test_where_sensors_look_is_said_from_the_nose(shown):
@@ -179,7 +179,7 @@ def test_the_camera_s_picture_is_of_the_chosen_contact(shown):
     for chosen in (*contact.values(), -1):
         name = next((n for n, c in contact.items() if c == chosen), "closing")
         rows = [r for r in recorded["detections"] if r["block"] == "camera" and r["target"] == name]
-        found = scope.camera(picture, DURATION_S, chosen)
+        found = scope.camera_picture(picture, DURATION_S, chosen)
         if not rows:
             assert found is None
             continue

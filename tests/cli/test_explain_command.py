@@ -8,7 +8,7 @@ from click.testing import CliRunner, Result
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.registry import find_component
 from dsa_des.cli import main
-from dsa_des.commands.scene import measured_shares
+from dsa_des.commands.scene import measure_effect_time_shares
 from dsa_des.scene.scene import load_scene
 
 SCENE = Path(__file__).parent.parent.parent / "configs" / "first_light.toml"
@@ -24,7 +24,7 @@ def test_measuring_shows_a_share_for_every_effect_that_calculates() -> None:
         "blocks.radar.mount_azimuth_deg=5",
         "weather.rain_rate_mm_h=5",
     ]
-    shares = measured_shares(load_scene(SCENE, sets=sets))
+    shares = measure_effect_time_shares(load_scene(SCENE, sets=sets))
     for effect in ("beam sweep", "mounting", "rain"):
         assert 0 < shares["radar", effect] < 1
     # The method of Pd is a choice: there is nothing to time.

@@ -189,8 +189,9 @@ def test_the_working_directory_is_on_the_path_only_meanwhile(tmp_path: Path) -> 
         "from components.gate import Gate\n"
     )
     script = (
-        "import os, sys; from dsa_des.block.registry import find; before = list(sys.path)\n"
-        "find('mine:Gate'); assert sys.path == before and os.getcwd() not in before"
+        "import os, sys; from dsa_des.block.registry import find_component; before = "
+        "list(sys.path)\n"
+        "find_component('mine:Gate'); assert sys.path == before and os.getcwd() not in before"
     )
     done = subprocess.run(
         [sys.executable, "-P", "-c", script], cwd=tmp_path, capture_output=True, text=True,
@@ -336,5 +337,5 @@ def test_only_as_a_program_the_working_directory_is_no_place_of_modules(
     monkeypatch.setattr(sys, "path", [place, "/other"])
     monkeypatch.setattr(sys, "argv", argv)
     monkeypatch.setattr(sys, "orig_argv", orig)
-    dsa_des._without_working_directory()
+    dsa_des._drop_working_directory_from_path()
     assert sys.path == (["/other"] if is_left_out else [place, "/other"])

@@ -96,9 +96,9 @@ def test_bad_places_are_refused_before_anything_runs(
     }[command]
     for place in (
         "dsa_des.running.simulation.Simulation.run",
-        "dsa_des.commands.cost.climb",
+        "dsa_des.commands.cost.measure_rungs",
         "components.line_of_sight.error_map.draw_error_map",
-        "components.thesis.reproduce.make",
+        "components.thesis.reproduce.make_items",
     ):
         monkeypatch.setattr(place, lambda *args, **kwargs: pytest.fail("it ran"))
     before = everything_in(places)
@@ -203,7 +203,7 @@ def test_compare_makes_its_folder_first_and_removes_it_if_nothing_came(
         assert [path.name for path in Path("studies").iterdir()] == ["compare-001"]
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dsa_des.commands.compare.run_into", interrupted)
+    monkeypatch.setattr("dsa_des.commands.compare.run_study_into_folder", interrupted)
     assert call("compare", *words, "--workers", 1, "--replicas", 2).exit_code == 130
     assert everything_in(places) == before
 
@@ -233,7 +233,7 @@ def test_graph_replaces_links_and_no_devices(places: Path, first_light: Path) ->
 def test_pages_and_rows_are_checked_beforehand(
     places: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("components.thesis.reproduce.make", lambda *a: pytest.fail("it ran"))
+    monkeypatch.setattr("components.thesis.reproduce.make_items", lambda *a: pytest.fail("it ran"))
     monkeypatch.setattr(
         "components.benchmark.run_benchmark.measure_in_new_process",
         lambda *a: pytest.fail("it ran"),

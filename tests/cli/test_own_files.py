@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from dsa_des.block.foreign import NotImportable, load_named, refuse_hidden_module
+from dsa_des.block.shadowed_packages import NotImportable, load_named, refuse_hidden_module
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from tests import warm_process

@@ -256,7 +256,7 @@ def test_a_type_without_a_ladder_is_named(own):
 
 def test_nothing_is_interrupted_after_a_deadline_that_was_met():
     before = signal.getsignal(signal.SIGALRM)
-    with grouping._deadline(60.0):
+    with grouping._interrupt_after(60.0):
         assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] <= 60.0
     assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
     assert signal.getsignal(signal.SIGALRM) is before

@@ -21,7 +21,7 @@ from dsa_des.cli import main
 from dsa_des.commands import cost
 from dsa_des.commands.cost import ladders_to_climb
 from dsa_des.costs import replay
-from dsa_des.costs.climb import climb
+from dsa_des.costs.climb import measure_rungs
 from dsa_des.costs.replay import RungRun, run_rung
 from dsa_des.costs.variants import Choice, Variants
 
@@ -53,12 +53,12 @@ def test_who_waits_is_told_what_is_measured(monkeypatch, capsys):
     monkeypatch.setattr(cost.time, "monotonic", lambda: next(now_s))
     progress = cost.CostProgress(silent=False)
     for step in ("a", "b", "c", "d"):
-        progress.say(step)  # standard error is no terminal: a line every ten seconds
+        progress.print_if_due(step)  # standard error is no terminal: a line every ten seconds
     assert capsys.readouterr() == ("", "b\nd\n")
     monkeypatch.setattr(cost.time, "monotonic", lambda: 0.0)
     monkeypatch.setattr(cost.sys.stderr, "isatty", lambda: True, raising=False)
-    cost.CostProgress(silent=True).say("nothing")
-    cost.CostProgress(silent=False).say("at once")
+    cost.CostProgress(silent=True).print_if_due("nothing")
+    cost.CostProgress(silent=False).print_if_due("at once")
     assert capsys.readouterr() == ("", "at once\n")
 
 
@@ -70,9 +70,9 @@ def test_ladders_are_printed_as_they_come_and_ctrl_c_keeps_them(tmp_path, monkey
         begun.append(ladder.name)
         if len(begun) == 2:
             raise KeyboardInterrupt
-        return climb(variants, name, ladder, **options)
+        return measure_rungs(variants, name, ladder, **options)
 
-    monkeypatch.setattr(cost, "climb", interrupted)
+    monkeypatch.setattr(cost, "measure_rungs", interrupted)
     out = tmp_path / "out"
     done = call("cost", str(SCENE), "--duration", "4", "--repeats", "1", "--block", "transform",
                 "--out", out)  # fmt: skip
@@ -87,7 +87,9 @@ def test_ladders_are_printed_as_they_come_and_ctrl_c_keeps_them(tmp_path, monkey
 
 
 def test_ctrl_c_before_the_first_ladder_leaves_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(cost, "climb", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+    monkeypatch.setattr(
+        cost, "measure_rungs", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt)
+    )
     out = tmp_path / "out"
     done = call("cost", str(SCENE), "--duration", "4", "--block", "radar", "--out", out)
     assert done.exit_code == 130 and done.stdout == ""
@@ -135,7 +137,7 @@ def test_the_reference_shows_its_own_error(rows):
 
 
 def test_geometry_errors_are_those_of_an_independent_library(variants):
-    costs = {c.rung: c for c in climb(variants, "transform", EARTH, repeats=1)}
+    costs = {c.rung: c for c in measure_rungs(variants, "transform", EARTH, repeats=1)}
     run = run_rung(variants.scene, "transform")
     azimuth, elevation, distance = [], [], []
     flat = []
@@ -162,11 +164,11 @@ def test_geometry_errors_are_those_of_an_independent_library(variants):
 
 
 def test_detection_errors_are_those_of_an_independent_calculation(variants):
-    costs = {c.rung: c for c in climb(variants, "radar", DETECTION, repeats=1)}
+    costs = {c.rung: c for c in measure_rungs(variants, "radar", DETECTION, repeats=1)}
     threshold_run = run_rung(
         variants.with_rungs([Choice("radar", DETECTION, DETECTION.rung("threshold"))]), "radar"
     )
-    block = threshold_run.fresh()
+    block = threshold_run.fresh_block()
     worst = []
     for wake in threshold_run.wakes:
         targets, rows = wake.held("targets")
@@ -176,12 +178,12 @@ def test_detection_errors_are_those_of_an_independent_calculation(variants):
         says = np.where(10 * np.log10(snr) >= block.threshold_db, 1.0, 0.0)
         worst.append(np.abs(says - pd))
     worst = np.concatenate(worst)
-    error = costs["threshold"].error
+    error = costs["threshold"].first_quantity_error
     assert error.mean == pytest.approx(float(worst.mean()), rel=0.01)
     assert error.p95 == pytest.approx(float(np.percentile(worst, 95)), rel=0.01)
-    assert costs["exact"].error.maximum < 1e-14
-    assert 0 < costs["table"].error.maximum < 1e-6
-    assert costs["gram_charlier"].error.maximum < 0.03
+    assert costs["exact"].first_quantity_error.maximum < 1e-14
+    assert 0 < costs["table"].first_quantity_error.maximum < 1e-6
+    assert costs["gram_charlier"].first_quantity_error.maximum < 0.03
 
 
 def test_a_rung_changes_its_block_only(variants):
@@ -203,7 +205,7 @@ def test_what_a_scene_cannot_have_is_said(tmp_path):
         str(SCENE), swaps=["radar=radar.range_boundary"], sets=["blocks.radar.range_km=5"]
     )
     with pytest.raises(Unavailable, match="wavelength_m"):
-        climb(boundary, "radar", DETECTION, repeats=1)
+        measure_rungs(boundary, "radar", DETECTION, repeats=1)
 
 
 @pytest.mark.parametrize(("band", "type_name"), [("eo", "optical.eo"), ("ir", "optical.ir")])
@@ -223,9 +225,9 @@ def test_accuracy_of_the_scene_is_the_budget_and_chooses_no_rung():
     loose = Variants(
         str(SCENE), sets=["accuracy.angle_deg=0.1", "accuracy.range_m=100"], duration_s=20
     )
-    costs = {c.rung: c for c in climb(loose, "transform", EARTH, repeats=1)}
+    costs = {c.rung: c for c in measure_rungs(loose, "transform", EARTH, repeats=1)}
     assert costs["flat_earth"].inside_budget  # 0.1 deg is 1.7 mrad
-    assert costs["ellipsoid"].error.maximum < 1e-9
+    assert costs["ellipsoid"].first_quantity_error.maximum < 1e-9
     cheapest = [c for c in costs.values() if c.cheapest_inside]
     assert len(cheapest) == 1 and cheapest[0].inside_budget
 
@@ -275,15 +277,15 @@ def test_garbage_is_collected_after_a_timed_pass_as_before_it(collects, fails, m
             raise RuntimeError("the block fails")
 
     timed = RungRun(None, "radar", ["first", "second"], {}, 0.0, 0.0)
-    monkeypatch.setattr(timed, "fresh", lambda: SimpleNamespace(run=run))
+    monkeypatch.setattr(timed, "fresh_block", lambda: SimpleNamespace(run=run))
     before = gc.isenabled()
     try:
         (gc.enable if collects else gc.disable)()
         if fails:
             with pytest.raises(RuntimeError, match="the block fails"):
-                timed.pass_s()
+                timed.time_one_pass_s()
         else:
-            assert timed.pass_s() >= 0.0
+            assert timed.time_one_pass_s() >= 0.0
         assert gc.isenabled() == collects
     finally:
         (gc.enable if before else gc.disable)()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.optical.area_of_cells import body_mesh, silhouette_table_of_bodies
 from components.optical.sensors import fuselage_length_m
 from components.optical.silhouette import union_area, visible_area
@@ -43,7 +43,7 @@ def test_a_line_is_detected_where_its_pixels_reach_the_threshold():
     noiseless = ["blocks.eo.noise_equivalent_contrast=0"]
     simulation, tables = run(swaps=["eo=optical.projection"], sets=noiseless)
     camera = simulation.components["eo"]
-    (roster,) = known_targets(camera.context)
+    (roster,) = offered_rosters(camera.context)
     craft = dict(zip(roster.names, roster.aircraft, strict=True))
     for d in seen_by(tables, "eo"):
         areas = craft[d["target"]].eo

@@ -6,8 +6,8 @@ import pytest
 
 import dsa_des
 from components.line_of_sight.transform import EARTH, REFRACTION
-from dsa_des.commands.cost import comparison
-from dsa_des.costs.climb import climb, inapplicable_reason
+from dsa_des.commands.cost import comparison_of_all_reports
+from dsa_des.costs.climb import inapplicable_reason, measure_rungs
 from dsa_des.costs.variants import Variants
 
 
@@ -24,13 +24,15 @@ def scene(configs, tmp_path):
 
 def test_straight_rays_err_by_the_bending(scene):
     variants = scene('[terrain]\nrefraction = "four_thirds"\n')
-    straight, bent = climb(variants, "transform", REFRACTION, repeats=1, compare=comparison())
+    straight, bent = measure_rungs(
+        variants, "transform", REFRACTION, repeats=1, compare=comparison_of_all_reports()
+    )
     assert (straight.in_scene, bent.in_scene) == (False, True)
     # The farthest is level, some 11 km away.
     expected = [1e3 * range_m * np.cos(elevation) / (8 * 6371008.8)
                 for range_m, elevation in _looks(variants)]  # fmt: skip
     assert max(expected) > 0.1
-    assert straight.error.maximum == pytest.approx(max(expected), rel=1e-3)
+    assert straight.first_quantity_error.maximum == pytest.approx(max(expected), rel=1e-3)
     assert inapplicable_reason(variants, "transform", REFRACTION) == ""
 
 
@@ -38,7 +40,9 @@ def test_it_is_left_out_where_rays_are_straight_and_the_earth_s_error_is_its_own
     variants = scene("")
     assert "rays are straight" in inapplicable_reason(variants, "transform", REFRACTION)
     bent = scene('[terrain]\nrefraction = "four_thirds"\n')
-    exact = climb(bent, "transform", EARTH, repeats=1, compare=comparison())[-1]
+    exact = measure_rungs(bent, "transform", EARTH, repeats=1, compare=comparison_of_all_reports())[
+        -1
+    ]
     assert exact.error_note == "nothing more exact is known of bent rays"
 
 

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 from matplotlib.figure import Figure
 
-from components.display.alerted import Alerted, draw_alerted_lines, draw_manoeuvres, style_of
+from components.display.alerted import Alerted, alert_style, draw_alerted_lines, draw_manoeuvres
 
 ROWS = [  # time, block, target, level
     (0.0, "one", "a", 0), (0.0, "one", "b", 1), (1.0, "one", "a", 2), (1.0, "two", "a", 1),
@@ -30,7 +30,7 @@ def test_an_alert_lasts_until_the_alerting_looks_again(alerted):
         "a": [(2, 1.0, 3.0), (3, 3.0, 4.0), (1, 5.0, 6.0)], "b": [(1, 0.0, 2.0)],
     }  # fmt: skip
     assert alerted.manoeuvres_s.tolist() == [2.5, 4.0] and alerted.levels == [1, 2, 3]
-    assert [line.get_label() for line in alerted.key()] == [
+    assert [line.get_label() for line in alerted.legend_entries()] == [
         "alert 1", "alert 2", "alert 3", "manoeuvre",
     ]  # fmt: skip
 
@@ -55,8 +55,10 @@ def test_lines_are_thicker_where_there_is_an_alert(alerted):
     assert ends == [
         ([10.0, 4.0], [30.0, 2.0]), ([30.0, 2.0], [40.0, 1.0]), ([50.0, 0.0], [60.0, -1.0]),
     ]  # fmt: skip
-    assert list(drawn.get_linewidths()) == [style_of(level)[1] for level in (2, 3, 1)]
-    assert style_of(1)[1] < style_of(2)[1] < style_of(3)[1] and style_of(4) == style_of(3)
+    assert list(drawn.get_linewidths()) == [alert_style(level)[1] for level in (2, 3, 1)]
+    assert alert_style(1)[1] < alert_style(2)[1] < alert_style(3)[1] and alert_style(
+        4
+    ) == alert_style(3)
     draw_manoeuvres(axes, np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     (marks,) = axes.lines
     assert marks.get_xydata().tolist() == [[1.0, 3.0], [2.0, 4.0]]
@@ -64,4 +66,4 @@ def test_lines_are_thicker_where_there_is_an_alert(alerted):
 
 def test_a_run_without_alerts_has_none(tmp_path):
     none = Alerted.read(tmp_path)
-    assert none.stretches == {} and len(none.manoeuvres_s) == 0 and none.key() == []
+    assert none.stretches == {} and len(none.manoeuvres_s) == 0 and none.legend_entries() == []

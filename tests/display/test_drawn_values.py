@@ -21,8 +21,8 @@ from components.display.map_view import MAP_WIDTH_IN, draw_outline, outline_of
 from components.display.recorded_rows import Detected, scan_period_s
 from components.display.report import DetectAndSenseReport
 from components.messages.reach import Reach
-from components.sensor.marks import EO, RADAR
 from components.sensor.mounting import SensorAxes
+from components.sensor.palette import EO, RADAR
 from dsa_des.cli import main
 from dsa_des.record.arrow import ParquetSink
 from dsa_des.record.recording import Recorder

@@ -15,8 +15,8 @@ from components.display.recorded_rows import (
     Detected,
     index_in_groups,
     read_scans,
+    row_strides,
     scans_between,
-    strides,
     thin_rows,
 )
 from components.display.summary import FusedSummary, SensorSummary
@@ -56,7 +56,7 @@ def test_what_is_kept_is_bounded_and_the_same_in_any_pieces(rows, cuts, most):
 @given(st.lists(st.integers(0, 500), min_size=1, max_size=8), st.integers(1, 300), st.data())
 def test_strides_never_shrink_and_short_series_are_spared(counts, most, data):
     more = [n + data.draw(st.integers(0, 200)) for n in counts]
-    before, after = (strides(np.array(c), most) for c in (counts, more))
+    before, after = (row_strides(np.array(c), most) for c in (counts, more))
     assert np.all(after >= before)
     total = int(np.sum(-(-np.array(counts) // before)))
     assert total <= max(most, len(counts))

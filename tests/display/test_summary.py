@@ -6,7 +6,7 @@ import numpy as np
 
 import dsa_des
 from components.display.summary import SensorSummary
-from components.display.terminal import outcome_lines, unseen_lines
+from components.display.terminal import lines_on_sensors_without_detection, outcome_lines
 from dsa_des.block.message import Text
 
 NAMES = ("eo", "radar")
@@ -180,7 +180,10 @@ def test_a_sensor_that_is_off_is_said_to_be(configs):
         configs / "first_light.toml", sets=["blocks.ir.enabled=false"], duration_s="0.1"
     )
     sensors = dsa_des.run(scene).summary["sensors"]
-    assert "ir saw nothing: it is switched off (enabled = false)" in unseen_lines(sensors)
+    assert (
+        "ir saw nothing: it is switched off (enabled = false)"
+        in lines_on_sensors_without_detection(sensors)
+    )
     assert [name for name, told in sensors.items() if "enabled" in told] == ["ir"]
 
 
@@ -194,7 +197,7 @@ def test_each_sensor_that_saw_nothing_says_why_and_no_other_does():
                   "skipped": {"one": 4, "none": 0, "other": 1011}},
         "alone": {"first_detection": None, "scans": 7, "evaluated": 7, "skipped": {}},
     }  # fmt: skip
-    assert unseen_lines(sensors) == [
+    assert lines_on_sensors_without_detection(sensors) == [
         "idle saw nothing: it never scanned",
         "blind saw nothing: target other in 1,011, one in 4, in reach but not detected in 5 of "
         "1,020 looks (one per scan and target)",

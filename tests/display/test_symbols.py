@@ -15,16 +15,16 @@ from components.display.symbols import (
     draw_density,
     draw_lines,
     rows_by_target,
+    sensor_marks,
     spread_indices,
     stagger_marks,
-    styles_of,
-    targets_key,
+    targets_legend_entry,
 )
 from components.fusion.gated import Gated
 from components.optical.sensors import ElectroOptical, Infrared, Projection
 from components.radar.radar import RangeBoundary
 from components.radar.swerling import SwerlingRadar
-from components.sensor import marks
+from components.sensor import palette
 from components.tracking.stub import TrackerStub
 from dsa_des.block.component import Component
 from dsa_des.block.mark import NEUTRAL, marks_of
@@ -143,13 +143,14 @@ def test_rows_by_target():
     assert rows_by_target(np.empty(0, dtype=np.int64)) == []
 
 
-KINDS = [marks.RADAR, marks.EO, marks.IR, marks.FUSION, marks.TRACKER]
+KINDS = [palette.RADAR, palette.EO, palette.IR, palette.FUSION, palette.TRACKER]
 
 
 def test_every_block_of_a_kind_has_the_colour_of_its_kind() -> None:
-    for cls, kind in ((SwerlingRadar, marks.RADAR), (RangeBoundary, marks.RADAR),
-                      (ElectroOptical, marks.EO), (Projection, marks.EO), (Infrared, marks.IR),
-                      (Gated, marks.FUSION), (TrackerStub, marks.TRACKER)):  # fmt: skip
+    for cls, kind in ((SwerlingRadar, palette.RADAR), (RangeBoundary, palette.RADAR),
+                      (ElectroOptical, palette.EO), (Projection, palette.EO), (Infrared,
+                      palette.IR),
+                      (Gated, palette.FUSION), (TrackerStub, palette.TRACKER)):  # fmt: skip
         for names in (["a", "b", "z"], ["z"]):
             classes: dict[str, type | None] = dict.fromkeys(names, Component) | {"z": cls}
             assert marks_of(classes)["z"] == kind, cls
@@ -157,12 +158,12 @@ def test_every_block_of_a_kind_has_the_colour_of_its_kind() -> None:
 
 def test_two_of_a_kind_share_the_colour_and_not_the_marker() -> None:
     found = marks_of({"front": SwerlingRadar, "aft": RangeBoundary})
-    assert found["front"].colour == found["aft"].colour == marks.RADAR.colour
+    assert found["front"].colour == found["aft"].colour == palette.RADAR.colour
     assert found["front"].marker != found["aft"].marker
 
 
 def test_a_block_that_says_nothing_is_neutral_and_a_missing_one_too() -> None:
-    found = styles_of(["gone", "mine"], {"mine": object()})
+    found = sensor_marks(["gone", "mine"], {"mine": object()})
     assert list(found.values()) == list(NEUTRAL[:2])
 
 
@@ -212,7 +213,7 @@ def test_the_ownship_s_line_is_drawn_over_those_of_targets_if_there_is_one(targe
 
 
 def test_the_key_of_targets_says_what_is_dense():
-    dense, thin = targets_key(True), targets_key(False)
+    dense, thin = targets_legend_entry(True), targets_legend_entry(False)
     assert (dense.get_label(), dense.get_linewidth()) == ("targets (darker: more)", 5.0)
     assert (thin.get_label(), thin.get_linewidth()) == ("target", 1.0)
     assert dense.get_color() == thin.get_color() == TARGET

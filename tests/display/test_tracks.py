@@ -10,8 +10,8 @@ from matplotlib.collections import PathCollection, QuadMesh
 from scipy.stats import chi2
 
 import dsa_des
-from components.display.consistency import draw_consistency, errors_squared
-from components.display.outcomes import distances
+from components.display.consistency import draw_consistency, nees_of_nearest_target
+from components.display.outcomes import distances_to_targets
 from components.display.tracks import DrawnTracks, draw_tracks
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.running.simulation import Simulation
@@ -94,7 +94,7 @@ def test_compared_trackers_have_their_own_means(tmp_path, monkeypatch, shown):
     errors, innovations = figure.axes
     assert "mean" not in errors.get_title(loc="left") + innovations.get_title(loc="left")
     columns = shown.tracks[0].columns
-    found, known = errors_squared(columns, two.targets.states(columns["state_s"]))
+    found, known = nees_of_nearest_target(columns, two.targets.states(columns["state_s"]))
     assert known.all()
     low, high = chi2.ppf([0.025, 0.975], 6)
     words = [text.get_text() for text in errors.get_legend().get_texts()]
@@ -141,7 +141,7 @@ def test_of_many_tracks_their_median_is_drawn(tmp_path, monkeypatch, shown, many
         return
     (median,) = drawn
     (spread,) = (band for band in errors.collections if len(band.get_paths()[0].vertices) > 20)
-    found, _ = errors_squared(one.columns, shown.targets.states(one.columns["state_s"]))
+    found, _ = nees_of_nearest_target(one.columns, shown.targets.states(one.columns["state_s"]))
     assert found.min() - 1e-9 < median.get_ydata().min() < median.get_ydata().max() < found.max()
     top = spread.get_paths()[0].vertices[:, 1].max()
     assert top / found.max() == pytest.approx(np.quantile(scales, 0.975), rel=0.3)
@@ -215,13 +215,13 @@ def test_errors_are_those_to_the_nearest_target_at_the_same_time():
     states = rng.normal(size=(3, 6, 4)) * 5.0
     states[0, :3] += 1e4  # far away all the time
     states[1, :, 2] = states[2, :, 2] = np.nan  # and at one instant nobody is near
-    found, known = errors_squared(columns, states)
+    found, known = nees_of_nearest_target(columns, states)
     assert known.tolist() == [True, True, False, True] and np.isnan(found[2])
     estimate = np.array([columns[name] for name in list(columns)[:6]])
     for row in (0, 1, 3):
         apart = [np.linalg.norm(estimate[:3, row] - states[t, :3, row]) for t in range(3)]
         error = estimate[:, row] - states[int(np.argmin(apart)), :, row]
         assert found[row] == pytest.approx(error @ np.linalg.inv(spread[row]) @ error)
-    np.testing.assert_allclose(distances(columns, slice(None), states[:, :3])[:, 0], [
+    np.testing.assert_allclose(distances_to_targets(columns, slice(None), states[:, :3])[:, 0], [
         np.linalg.norm(estimate[:3, 0] - states[t, :3, 0]) for t in range(3)])  # fmt: skip
-    assert not errors_squared(columns, np.empty((0, 6, 4)))[1].any()
+    assert not nees_of_nearest_target(columns, np.empty((0, 6, 4)))[1].any()

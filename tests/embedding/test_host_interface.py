@@ -400,7 +400,7 @@ def test_a_host_that_adds_up_its_steps_makes_every_scan_at_its_own_call(
     for call, time_s in zip(range(calls), times, strict=False):
         at = call * hundredths
         most = max(most, abs(float(time_s) - at / 100))
-        made = chain.due(chain.tick_of(time_s)).scans
+        made = chain.start_step(chain.tick_of(time_s)).scans
         assert set(made) == {n for n, rate in rates.items() if at % (100 // rate) == 0}, time_s
     assert most > 0.5e-9  # else this shows nothing
 
@@ -416,8 +416,8 @@ def test_a_host_that_adds_up_its_steps_and_calls_now_and_then_makes_scans_at_the
     times = list(itertools.islice(summed(0.01), 75_000))
     assert 710.0 - times[71_000] > 0.5e-9
     for call in range(0, 75_000, 500):
-        assert len(chain.due(chain.tick_of(times[call])).scans) == 3, times[call]
-        assert not chain.due(chain.tick_of(times[call + 1])).scans
+        assert len(chain.start_step(chain.tick_of(times[call])).scans) == 3, times[call]
+        assert not chain.start_step(chain.tick_of(times[call + 1])).scans
 
 
 def test_sightings_are_those_of_a_host_that_counts_its_steps(scene):

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from components.encounters.encounter_tables import EncounterTable, _labels
+from components.encounters.encounter_tables import EncounterTable, _class_labels_and_errors
 from components.encounters.set_commands import closest_approaches
 from components.formats.set_file import read_set
 from components.formats.track_files import _refuse_cut_off, read_paired_text
@@ -181,10 +181,10 @@ def test_a_set_is_put_at_no_impossible_origin(tmp_path, at):
 def test_classes_are_named_by_the_edges_on_both_sides():
     values: list[object] = [7, "0.5", 1, 4.99, "2", "many", None, -3]
     table = EncounterTable(Path("t.csv"), {"x": values}, list(range(1, 9)))
-    labels, wrong = _labels(table, "x", "1,2,5")
+    labels, wrong = _class_labels_and_errors(table, "x", "1,2,5")
     below, inner, top = "1: below 1", ("2: 1 to 2", "3: 2 to 5"), "4: 5 and above"
     assert labels[[0, 1, 2, 3, 4, 7]].tolist() == [top, below, *inner, inner[1], below]
     assert wrong == {5: "x is no number", 6: "x is no number"}
-    assert _labels(table, None, None)[0].tolist() == [0] * 8
+    assert _class_labels_and_errors(table, None, None)[0].tolist() == [0] * 8
     one = EncounterTable(Path("t.csv"), {"a": ["p", None], "b": [1, 2]}, [1, 2])
-    assert _labels(one, "a, b", None)[0].tolist() == ["p, 1", ", 2"]
+    assert _class_labels_and_errors(one, "a, b", None)[0].tolist() == ["p, 1", ", 2"]

@@ -37,7 +37,7 @@ def test_a_good_model_is_read_by_name(tmp_path: Path) -> None:
     path.write_text(TEXT, encoding="utf-8")
     model = read_model(path)
     assert model.labels == ("A", "v", "\\dot v", "\\dot h", "\\dot \\psi", "L")
-    assert model.dynamic == (2, 3, 4) and not model.notes
+    assert model.dynamic_indices == (2, 3, 4) and not model.notes
     assert model.bins[0].edges is None
     # The bin around zero holds zero only.
     assert model.bins[3].low.tolist() == [-900.0, 0.0, 450.0]

@@ -10,7 +10,7 @@ from components.encounters.model_file import read_model
 from components.encounters.pair_densities import (
     PairingRules,
     StepDensity,
-    speeds_over_directions,
+    relative_speed_over_directions,
 )
 from components.encounters.pairing import COURSES, Pairs, PairSampler, draw_courses
 from components.encounters.track_rules import TrackError
@@ -120,7 +120,7 @@ def passes(pairs: Pairs, radius_ft: float, half_height_ft: float) -> np.ndarray:
 
 
 def test_the_gas_models_closed_form_over_the_radius(tmp_path: Path) -> None:
-    pairs = sampler(tmp_path, GAS, **FREE).pairs(range(3000))
+    pairs = sampler(tmp_path, GAS, **FREE).sample_pairs(range(3000))
     # Mean relative speeds, by plain Monte Carlo of velocities.
     random = np.random.default_rng(2)
     count = 400_000
@@ -152,8 +152,8 @@ def test_the_gas_models_closed_form_over_the_radius(tmp_path: Path) -> None:
 
 
 def test_importance_weights_agree_with_a_plain_monte_carlo(tmp_path: Path) -> None:
-    weighted = sampler(tmp_path, GAS, **FREE).pairs(range(5000))
-    plain = sampler(tmp_path, GAS, 2, **FREE, **PLAIN).pairs(range(5000))
+    weighted = sampler(tmp_path, GAS, **FREE).sample_pairs(range(5000))
+    plain = sampler(tmp_path, GAS, 2, **FREE, **PLAIN).sample_pairs(range(5000))
 
     def estimate(pairs: Pairs, what: np.ndarray) -> tuple[float, float]:
         p = (pairs.weight * what).sum() / pairs.weight.sum()
@@ -178,7 +178,7 @@ def test_importance_weights_agree_with_a_plain_monte_carlo(tmp_path: Path) -> No
 
 def test_pairs_are_where_they_should_be(tmp_path: Path) -> None:
     rules = PairingRules()
-    pairs = sampler(tmp_path, TURNS).pairs(range(60))
+    pairs = sampler(tmp_path, TURNS).sample_pairs(range(60))
     here = np.arange(60)
     north, east, up = (v[1] - v[0] for v in (pairs.north_ft, pairs.east_ft, pairs.up_ft))
     apart = np.hypot(north, east)
@@ -225,7 +225,7 @@ def test_pairs_are_where_they_should_be(tmp_path: Path) -> None:
 
 def test_relative_speed_over_directions_takes_the_parameter_not_the_modulus() -> None:
     first, second = np.array([300.0, 150.0]), np.array([100.0, 150.0])
-    found = speeds_over_directions(first, second, np.array([10.0, 0.0]))
+    found = relative_speed_over_directions(first, second, np.array([10.0, 0.0]))
     assert found[1] == pytest.approx(8 * 150)  # ∫ 2 v |sin(ψ/2)| dψ
     by_hand = quad(lambda p: np.sqrt(300**2 + 100**2 - 6e4 * np.cos(p) + 100), 0, 2 * np.pi)[0]
     assert found[0] == pytest.approx(by_hand, rel=1e-9)
@@ -233,11 +233,11 @@ def test_relative_speed_over_directions_takes_the_parameter_not_the_modulus() ->
 
 def test_a_pair_is_the_same_alone_and_in_any_batch(tmp_path: Path) -> None:
     pairing = sampler(tmp_path, TURNS)
-    alone, batch = pairing.pairs(range(17, 18)), pairing.pairs(range(3, 40))
+    alone, batch = pairing.sample_pairs(range(17, 18)), pairing.sample_pairs(range(3, 40))
     for name, values in vars(alone).items():
         assert np.array_equal(values[..., 0], vars(batch)[name][..., 14]), name
     assert batch.numbers.tolist() == list(range(3, 40))
-    other = sampler(tmp_path, TURNS, seed=2).pairs(range(17, 18))
+    other = sampler(tmp_path, TURNS, seed=2).sample_pairs(range(17, 18))
     assert other.weight[0] != alone.weight[0]
 
 
@@ -248,7 +248,7 @@ def test_models_that_never_meet_say_so(tmp_path: Path, monkeypatch: pytest.Monke
     pairing = PairSampler(read_model(high), read_model(low), 1, PairingRules())
     monkeypatch.setattr("components.encounters.pairing._MOST_ATTEMPTS", 500)
     with pytest.raises(TrackError, match="the two models do not meet"):
-        pairing.pairs(range(2))
+        pairing.sample_pairs(range(2))
 
 
 def test_whoever_begins_near_but_high_above_is_kept(
@@ -257,7 +257,7 @@ def test_whoever_begins_near_but_high_above_is_kept(
     """The smallest range is compared with the range, and the smallest height with the height."""
     monkeypatch.setattr("components.encounters.pairing._MOST_ATTEMPTS", 3000)
     far = {"start_range_ft": 1e6, "start_vertical_ft": 800.0}
-    pairs = sampler(tmp_path, GAS, **far).pairs(range(20))
+    pairs = sampler(tmp_path, GAS, **far).sample_pairs(range(20))
     assert (np.abs(pairs.up_ft[1, 0] - pairs.up_ft[0, 0]) >= 800).all()
 
 
@@ -272,7 +272,7 @@ def test_rules_that_do_not_fit_are_refused() -> None:
 
 def test_published_models_pair(tmp_path: Path) -> None:
     model = read_model(reference_file("models/uncor_1200code_v1.txt"))
-    pairs = PairSampler(model, model, 1, PairingRules()).pairs(range(300))
+    pairs = PairSampler(model, model, 1, PairingRules()).sample_pairs(range(300))
     assert np.isfinite(pairs.weight).all() and (pairs.weight > 0).all()
     assert pairs.up_ft.min() >= 500 and pairs.up_ft.max() <= 18000
     shares = np.histogram(np.abs(pairs.horizontal_ft), [0, 500, 1500, 18240])[0] / 300

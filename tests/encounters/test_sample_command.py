@@ -9,7 +9,7 @@ from click.testing import CliRunner, Result
 from components.encounters import model_commands
 from components.encounters.command import encounters
 from components.encounters.model_file import read_model
-from components.encounters.track_rules import TrackRules, conditional
+from components.encounters.track_rules import TrackRules, conditional_distribution
 from tests.alerting.reference_data import rows
 from tests.encounters.model_text import small_model
 
@@ -81,9 +81,9 @@ def test_limits_are_upper_edges_of_the_bins_with_the_1_and_99_percent_points(mod
     read = read_model(model)
     rules = TrackRules(read)
     # By hand: P(v | A, L) from all cases that the counts stand for.
-    speeds = conditional(read.initial, [0, 5], 1)
+    speeds = conditional_distribution(read.initial, [0, 5], 1)
     assert speeds.shape == (4, 3) and speeds.sum(axis=1) == pytest.approx(1)
-    everywhere = conditional(read.initial, [], 1)[0]
+    everywhere = conditional_distribution(read.initial, [], 1)[0]
     counts = read.initial.nodes[1].counts.sum(axis=0)
     assert everywhere == pytest.approx(counts / counts.sum(), abs=2e-3)
     low, high = rules._speed_ft_s / (1852 / 3600 / 0.3048)

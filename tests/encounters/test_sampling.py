@@ -89,8 +89,8 @@ def test_every_second_follows_the_networks_columns(name: str, tmp_path: Path) ->
     model = read_model(path)
     states = []
     for place in range(len(slow.labels)):
-        if place in model.dynamic:
-            values = tracks.changing[:, model.dynamic.index(place)]
+        if place in model.dynamic_indices:
+            values = tracks.changing[:, model.dynamic_indices.index(place)]
             states.append(bins_of(slow, place, values))
         else:
             bins = bins_of(slow, place, tracks.initial[place])
@@ -98,10 +98,12 @@ def test_every_second_follows_the_networks_columns(name: str, tmp_path: Path) ->
     steps = np.array(states)
     before, after = steps[:, :-1].reshape(len(states), -1), steps[:, 1:].reshape(len(states), -1)
     seen: dict[tuple[int, ...], Counter] = {}
-    for old, new in zip(before.T.tolist(), after[list(model.dynamic)].T.tolist(), strict=True):
+    for old, new in zip(
+        before.T.tolist(), after[list(model.dynamic_indices)].T.tolist(), strict=True
+    ):
         seen.setdefault(tuple(old), Counter())[tuple(new)] += 1
     order = [slow.labels.index(slow.now[p].removesuffix("(t+1)")) for p in slow.later_tables]
-    assert order == list(model.dynamic)
+    assert order == list(model.dynamic_indices)
     total, expected_total, likely = 0, 0.0, []
     for state, found in sorted(seen.items(), key=lambda item: -item[1].total())[:60]:
         exact = next_chances(slow, state)
@@ -109,7 +111,7 @@ def test_every_second_follows_the_networks_columns(name: str, tmp_path: Path) ->
         many = found.total()
         counts = np.array([found[choice] for choice in exact])
         likely.append(chance_of(counts, np.array(list(exact.values())) * many))
-        stays = tuple(state[p] for p in model.dynamic)
+        stays = tuple(state[p] for p in model.dynamic_indices)
         total, expected_total = total + found[stays], expected_total + many * exact.get(stays, 0.0)
     assert min(likely) > UNLIKELY / len(likely)
     # Taken together they are uniform, or nearly so where cells are few.
@@ -122,7 +124,7 @@ def test_the_chain_forgets_its_start_as_the_exact_one_does(tmp_path: Path) -> No
     path = model_file("small", tmp_path)
     slow, tracks = sampled(path, 30_000, 12)
     model = read_model(path)
-    static = [p for p in range(6) if p not in model.dynamic]
+    static = [p for p in range(6) if p not in model.dynamic_indices]
     bins = [bins_of(slow, p, tracks.initial[p]) for p in range(6)]
     start = Counter(zip(*(b.tolist() for b in bins), strict=True))
     chances = dict(start)
@@ -132,19 +134,19 @@ def test_the_chain_forgets_its_start_as_the_exact_one_does(tmp_path: Path) -> No
         for state, weight in chances.items():
             for choice, chance in steps[state].items():
                 new = list(state)
-                for p, value in zip(model.dynamic, choice, strict=True):
+                for p, value in zip(model.dynamic_indices, choice, strict=True):
                     new[p] = value
                 later[tuple(new)] = later.get(tuple(new), 0.0) + weight * chance
         chances = later
     ends = list(bins)
-    for k, p in enumerate(model.dynamic):
+    for k, p in enumerate(model.dynamic_indices):
         ends[p] = bins_of(slow, p, tracks.changing[12, k])
     found = Counter(zip(*(b.tolist() for b in ends), strict=True))
     assert set(found) <= set(chances)
     seen = np.array([found[state] for state in chances])
     assert chance_of(seen, np.array(list(chances.values()))) > UNLIKELY
     # It has moved: the first state's distribution would be refused.
-    dynamic = [tuple(state[p] for p in model.dynamic) for state in chances]
+    dynamic = [tuple(state[p] for p in model.dynamic_indices) for state in chances]
     assert len(set(dynamic)) > 10 and static
 
 
@@ -153,7 +155,7 @@ def test_values_hold_unless_they_are_drawn_anew_at_their_rate(name: str, tmp_pat
     path = model_file(name, tmp_path)
     slow, tracks = sampled(path, 4000, 20)
     model = read_model(path)
-    for k, place in enumerate(model.dynamic):
+    for k, place in enumerate(model.dynamic_indices):
         values = tracks.changing[:, k]
         bins = bins_of(slow, place, values)
         edges = slow.edges[place]

@@ -59,7 +59,7 @@ def test_generated_sets_fly_as_the_pairs_did(model: Path, tmp_path: Path) -> Non
     assert done.exit_code == 0 and "12 encounters of 180 s" in done.stdout
     found = read_set(out)
     read = read_model(model)
-    pairs = PairSampler(read, read, 4, PairingRules()).pairs(range(30, 42))
+    pairs = PairSampler(read, read, 4, PairingRules()).sample_pairs(range(30, 42))
     assert found.numbers.tolist() == list(range(30, 42))
     assert found.weights == pytest.approx(pairs.weight, rel=1e-15)
     assert found.reference_deg == (-41.0, 20.0)

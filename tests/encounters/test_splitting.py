@@ -7,7 +7,12 @@ import pyarrow.parquet as pq
 import pytest
 
 import dsa_des
-from components.encounters.splitting import draw_copies, expected_copies, nearness, split_set
+from components.encounters.splitting import (
+    draw_copies,
+    expected_copies,
+    least_miss_in_nmac_sizes,
+    split_set,
+)
 from components.formats.set_file import read_set
 from components.metrics.risk import risk_ratio
 from tests.encounters.test_set_file import call
@@ -80,7 +85,7 @@ def test_a_set_is_split_and_flown_and_its_families_are_the_units(tmp_path: Path)
     done = call("split", file, "--levels", "40,8", "--copies", "0.5,1,3", "--out", out)
     assert done.exit_code == 0 and "copies of" in done.stdout
     whole, some = read_set(file), read_set(out)
-    near = np.array([nearness(whole, place) for place in range(12)])
+    near = np.array([least_miss_in_nmac_sizes(whole, place) for place in range(12)])
     by_hand = np.select([near < 8, near < 40], [3.0, 1.0], 0.5)
     many = np.bincount(some.extra["family"].astype(int), minlength=12)
     assert (many[near < 8] == 3).all() and (many[(near >= 8) & (near < 40)] == 1).all()

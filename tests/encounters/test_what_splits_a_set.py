@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from components.encounters.splitting import nearness
+from components.encounters.splitting import least_miss_in_nmac_sizes
 from components.formats.set_file import read_set
 from dsa_des.cli import main
 from tests.encounters.scenes.test_risk_of_a_set import SCENE, table
@@ -60,8 +60,10 @@ def test_nearness_is_in_sizes_of_the_cylinder(file: Path) -> None:
         across = np.hypot(own[1] - other[1], own[2] - other[2]) / (500 * 0.3048)
         height = np.abs(own[3] - other[3]) / (100 * 0.3048)
         assert np.ptp(height) == pytest.approx(0.0, abs=1e-9) and height[0] > 0.5
-        assert nearness(found, place) == pytest.approx(np.maximum(across, height).min())
-    assert nearness(found, 5) == pytest.approx(400.0 / 30.48)  # by its height alone
+        assert least_miss_in_nmac_sizes(found, place) == pytest.approx(
+            np.maximum(across, height).min()
+        )
+    assert least_miss_in_nmac_sizes(found, 5) == pytest.approx(400.0 / 30.48)  # by its height alone
 
 
 def test_a_run_tells_the_number_and_weight_of_its_encounter(file: Path) -> None:

@@ -9,8 +9,8 @@ import pytest
 from components.association.jpda import exact_marginals, marginals
 from components.estimation.estimator import (
     Estimates,
-    innovation_squared,
     log_mixture,
+    mixture_innovation_squared,
     mixture_moments,
     pair_measurement,
 )
@@ -92,7 +92,7 @@ def test_interacting_filters(kind):
     moments = estimator.expect(kind, ahead, place)
     said = pair_measurement(moments, every, z, r, None, ahead[2])
     after = estimator.update(ahead, every, said, every)
-    nis = innovation_squared(said, ahead[2], every)
+    nis = mixture_innovation_squared(said, ahead[2], every)
     mixture = log_mixture(ahead[2], said.log_likelihoods)
     whole = mixture_moments(after)
     fresh = [0.0, (4.0 * DEGREE) ** 2, 4.0]

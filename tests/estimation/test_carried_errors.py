@@ -157,7 +157,7 @@ def tracked(estimator, looks, place, errors, white):
         state[:6, 0] = START
         for i in range(size):
             covariance[i, i] = (500.0**2 if i < 3 else 50.0**2) if i < 6 else 1.0
-        for i in range(6 + estimator.errors, size):
+        for i in range(6 + estimator.error_count, size):
             covariance[i, i] = 1e-12
         states.append(state)
         covariances.append(covariance)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.estimation.batched import cholesky, distance_squared, solve_lower
+from components.estimation.batched import cholesky, mahalanobis_squared, solve_lower
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, update
 from components.estimation.measurement import Kind, expected_measurement, linearise, residual
@@ -81,7 +81,7 @@ def test_normalised_errors_of_far_targets_have_the_mean_of_chi_square():
         )
         state, covariance, found = step("ekf", model, state, covariance, dt, kind, place, variance)
         apart = residual(seen, found.expected)
-        nis.append(distance_squared(found.root, apart))
+        nis.append(mahalanobis_squared(found.root, apart))
         state, covariance = update(state, covariance, found, apart)
     error = (truth - state).T
     nees = np.einsum("ni,nij,nj->n", error, np.linalg.inv(covariance.transpose(2, 0, 1)), error)

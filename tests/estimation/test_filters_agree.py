@@ -18,7 +18,7 @@ from components.estimation.measurement import (
     Kind,
     expected_measurement,
     linearise,
-    position_of,
+    position_and_jacobian,
     residual,
 )
 from components.estimation.motion import (
@@ -88,7 +88,7 @@ def test_places_in_the_frame_are_those_of_ecef_and_rotation_matrices():
     body = crooked.body(crooked.ROLLING)
     np.testing.assert_allclose(seen[:2], crooked.angles(body), atol=1e-9)
     assert seen[2] == pytest.approx(np.linalg.norm(body), abs=1e-5)
-    back, _ = position_of(seen[:, np.newaxis], place)
+    back, _ = position_and_jacobian(seen[:, np.newaxis], place)
     np.testing.assert_allclose(back[:, 0], in_frame, atol=1e-6)
 
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from components.estimation.frame import SensorPose
-from components.estimation.iterated import iterate
+from components.estimation.iterated import iterate_updates_in_place
 from components.estimation.kalman import innovation, update
 from components.estimation.measurement import Kind, expected_measurement, linearise, residual
 
@@ -29,7 +29,7 @@ def corrected(east_m, deviation):
     apart = residual(measured, first.expected)
     once = update(state, covariance, first, apart)
     again = tuple(part.copy() for part in once)
-    iterate(KIND, pose, (state, covariance), again, first, apart)
+    iterate_updates_in_place(KIND, pose, (state, covariance), again, first, apart)
     return (state, covariance, measured, pose, variance), once, again
 
 

@@ -6,7 +6,7 @@ import pytest
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import innovation, update
 from components.estimation.measurement import Kind, expected_measurement, linearise, residual
-from components.estimation.modified_polar import correct_in_polar
+from components.estimation.modified_polar import apply_correction_in_polar
 from components.estimation.motion import ConstantVelocity, predict
 from components.tracking.association import is_arc_bent
 
@@ -40,7 +40,7 @@ def test_a_covariance_goes_into_polar_coordinates_before_and_comes_back_after():
         before = np.concatenate([np.array(line), [40.0, -35.0, 3.0]])[:, None]
         before[:3] += sensor
         after = before + RNG.normal(size=(6, 1)) * 1e-4
-        state, found = correct_in_polar(before, after, covariance[:, :, None], sensor)
+        state, found = apply_correction_in_polar(before, after, covariance[:, :, None], sensor)
         np.testing.assert_allclose(state, after, atol=1e-6)
         one, other = derivative(before[:, 0], sensor[:, 0]), derivative(state[:, 0], sensor[:, 0])
         step = np.linalg.solve(other, one)
@@ -57,7 +57,7 @@ def test_a_direction_that_turns_turns_the_uncertainty_with_it(axes):
     after[second] = 5000.0 * angle
     spread = np.eye(6)[:, :, None].copy()
     spread[first, first] = 2000.0**2
-    state, found = correct_in_polar(before, after, spread, np.zeros((3, 1)))
+    state, found = apply_correction_in_polar(before, after, spread, np.zeros((3, 1)))
     line = np.cos(angle) * identity[first] + np.sin(angle) * identity[second]
     np.testing.assert_allclose(state[:3, 0], 5000.0 * line, atol=1e-9)
     assert np.isclose(line @ found[:3, :3, 0] @ line, 2000.0**2, rtol=1e-6)
@@ -96,7 +96,9 @@ def test_ranges_are_not_made_up_from_directions():
                 state, spread = predict(model, state, spread, np.full(count, 1.0 / hz))
                 known = innovation(*linearise(kind, state, place), spread, deviation**2)
                 new = update(state, spread, known, residual(seen, known.expected))
-                state, spread = new if way == "cartesian" else correct_in_polar(state, *new, own)
+                state, spread = (
+                    new if way == "cartesian" else apply_correction_in_polar(state, *new, own)
+                )
             if k == 30 * hz:
                 break
             target = model.move(target, np.full(count, 1.0 / hz))
@@ -131,10 +133,10 @@ def test_a_track_is_bent_where_its_arc_leaves_the_line_by_a_third_of_its_depth(b
         def __len__(self):
             return 4
 
-        def states(self):
+        def states_by_model(self):
             return [state]
 
-        def covariances(self):
+        def covariances_by_model(self):
             return [spread]
 
     assert is_arc_bent(Tracks(), place).tolist() == [False, False, True, True]

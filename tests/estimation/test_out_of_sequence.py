@@ -6,7 +6,7 @@ import pytest
 from components.estimation.carried_errors import MotionWithErrors
 from components.estimation.kalman import innovation, update
 from components.estimation.motion import ConstantAcceleration, ConstantVelocity, predict
-from components.estimation.out_of_sequence import retrodiction, retrodiction_by_motion
+from components.estimation.out_of_sequence import retrodict_before_start, retrodict_between
 
 RNG = np.random.default_rng(3)
 H = RNG.normal(size=(2, 6))[:, :, np.newaxis]
@@ -38,7 +38,7 @@ def both(model, late, times=(1.0, 1.7, 2.2, 3.0)):
     known = in_order(model, start, [one for k, one in enumerate(given) if k != late])
     then_s, measured = given[late]
     before, now = known[late], known[-1]
-    then = retrodiction(
+    then = retrodict_between(
         model, before[1:], now[1:], np.array([then_s - before[0]]), np.array([now[0] - then_s])
     )
     found = then.carry_forward(*now[1:], *corrected(then.state, then.covariance, measured))
@@ -72,7 +72,7 @@ def test_before_all_that_was_known_it_is_what_both_instants_say_together(model):
     root, state = RNG.normal(size=(size, size)), RNG.normal(size=(size, 1)) * 30.0
     now = state, (root @ root.T * 50.0 + np.eye(size))[:, :, np.newaxis]
     measured = RNG.normal(size=(2, 1)) * 5.0
-    then = retrodiction_by_motion(model, now, since)
+    then = retrodict_before_start(model, now, since)
     found = then.carry_forward(*now, *corrected(then.state, then.covariance, measured))
 
     whole, slope = np.zeros((2 * size, 2 * size)), np.zeros((2, 2 * size))
@@ -98,7 +98,7 @@ def test_errors_that_are_forgotten_were_as_large_before_all_that_was_known():
     first = before + here.T @ here
     state = np.linalg.solve(first, here.T @ seen_here)
     now = state, np.linalg.inv(first)[:, :, np.newaxis]
-    then = retrodiction_by_motion(model, now, since)
+    then = retrodict_before_start(model, now, since)
     root = there[:, :, np.newaxis]
     known = np.einsum("mdn,dn->mn", root, then.state)
     what = innovation(known, root, then.covariance, np.ones((12, 1)))

@@ -119,8 +119,8 @@ def nees_of(estimator, intensity, flown, seed=5):
 def begun(said, told, age, model, place):
     state, covariance = np.zeros((12, COUNT)), np.zeros((12, 12, COUNT))
     state[:6] = said
-    effects = told.effects(said, place)
-    new = age.errors(model, state, np.ones((3, COUNT)))[0]
+    effects = told.effects_on_reported_states(said, place)
+    new = age.error_covariances(model, state, np.ones((3, COUNT)))[0]
     for i in range(6):
         new[i, i] += WHITE_M2
         covariance[6 + i, 6 + i] = 1.0
@@ -200,7 +200,7 @@ def test_what_a_target_did_since_is_in_what_is_told_of_earlier_by_how_old_it_is(
     carried_s, late_s, velocity_age_s, since_s = 0.4, 0.5, 1.3, 0.7
     ages = Ages(*(np.array([one]) for one in (carried_s, velocity_age_s, since_s, late_s)))
     still, many = np.zeros((model.size, 1)), model.size // 3
-    error, shared = ages.errors(model, still, np.array([[0.0], [0.0], [9.0]]))
+    error, shared = ages.error_covariances(model, still, np.array([[0.0], [0.0], [9.0]]))
     ago_s = (np.arange(20_000) + 0.5) * 1e-4  # for how long it has acted
     # Back from now it is taken for what always was: what was told of then lacks it.
     position = np.maximum(carried_s + late_s - ago_s, 0.0)
@@ -234,7 +234,7 @@ def test_what_is_told_of_a_turn_is_expected_as_it_was():
 
     def expected(state):
         moments = linear_moments(*told.linearise(kind, state, place), covariance)
-        return ages._rotate_back(moments, model, state, covariance)
+        return ages._correct_for_past_velocity(moments, model, state, covariance)
 
     then, tangent = -rate * 0.9, -rate * 0.9
     radius = speed / rate
@@ -296,7 +296,7 @@ def test_what_a_track_and_a_report_may_have_in_common_they_have():
     seen, slope = reported.linearise(KIND, state, pose())
     ages = Ages(0.3 * ones, 0.3 * ones, 0.6 * ones, 0.0 * ones)
     before = linear_moments(seen, slope, covariance)
-    _, shared = ages.errors(model, state, covariance[3, 3] * np.ones((3, COUNT)))
+    _, shared = ages.error_covariances(model, state, covariance[3, 3] * np.ones((3, COUNT)))
     expected = before.cross + np.einsum("ikn,mkn->imn", shared[:, :3], slope[:, :3])
     expected += np.einsum("ikn,mkn->imn", shared[:, 3:], slope[:, 3:6])
     found = ages.add_age_errors(before, model, state, covariance).cross

@@ -6,14 +6,18 @@ import pytest
 from components.estimation.frame import pose_in_frame
 from components.estimation.measurement import (
     Kind,
-    direction,
+    azimuth_elevation_and_variances,
+    cone_half_angle_rad,
     expected_measurement,
-    half_angle_rad,
-    range_share,
+    relative_range_deviation,
 )
 from components.geometry.attitude import body_angles, body_to_ned, unit_vector
 from components.geometry.sensor_axes import rotate_variances
-from components.surveillance.believed_line import OwnBelief, ned_to_body_angles, variances_in_body
+from components.surveillance.believed_line import (
+    OwnBelief,
+    line_of_sight_variances,
+    ned_to_azimuth_elevation_range,
+)
 
 
 def spread_of(function, at, covariance):
@@ -51,13 +55,13 @@ def test_of_a_position_that_a_banked_ownship_is_told(random):
     own = OwnBelief(*np.array([[-33.9], [18.4], [900.0]]), *attitude[:, np.newaxis])
     ned, (across, along, down) = random.normal(0.0, 3000.0, 3), random.uniform(10.0, 1e4, 3)
     variances = [np.array([value]) for value in (across, along, down)]
-    found = variances_in_body(own, ned[:, np.newaxis], tuple(variances))
+    found = line_of_sight_variances(own, ned[:, np.newaxis], tuple(variances))
     cos, sin = ned[:2] / np.hypot(*ned[:2])
     turn = np.array([[-sin, cos, 0.0], [cos, sin, 0.0], [0.0, 0.0, 1.0]])
     covariance = turn.T @ np.diag([across, along, down]) @ turn
 
     def seen(offset):
-        return np.concatenate(ned_to_body_angles(own, offset[:, np.newaxis]))
+        return np.concatenate(ned_to_azimuth_elevation_range(own, offset[:, np.newaxis]))
 
     assert np.concatenate([*found.values()]) == pytest.approx(
         spread_of(seen, ned, covariance), rel=1e-4
@@ -73,7 +77,7 @@ def test_of_a_track_s_direction_and_the_cone_that_holds_it(random):
     )  # fmt: skip
     away = at - place.position_m[:, 0]
     column, whole = away[:, np.newaxis], covariance[:, :, np.newaxis]
-    *_, azimuth, elevation = direction(column, whole)
+    *_, azimuth, elevation = azimuth_elevation_and_variances(column, whole)
     in_the_frame = pose_in_frame(*[np.zeros((3, 1))] * 3)
 
     def angles(offset):
@@ -85,11 +89,11 @@ def test_of_a_track_s_direction_and_the_cone_that_holds_it(random):
     assert [float(azimuth[0]), float(elevation[0])] == pytest.approx(wanted, rel=1e-4)
     distance = np.linalg.norm(away)
     along = away / distance
-    assert range_share(column, whole)[0] == pytest.approx(
+    assert relative_range_deviation(column, whole)[0] == pytest.approx(
         np.sqrt(along @ covariance @ along) / distance
     )
     # Across the line of sight, whichever way the axes lean.
     flat = np.eye(3) - np.outer(along, along)
     widest = np.linalg.eigvalsh(flat @ covariance @ flat)[-1]
-    found = half_angle_rad(at[:, np.newaxis], whole, place, 2.5)[0]
+    found = cone_half_angle_rad(at[:, np.newaxis], whole, place, 2.5)[0]
     assert found == pytest.approx(2.5 * np.sqrt(widest) / distance, rel=1e-6)

@@ -17,11 +17,11 @@ from components.display.recorded_run import RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK
 from components.export.command import export
 from components.export.czml import czml_text
-from components.export.exported import _geoid
+from components.export.export_formats import _geoid_note_and_height_m
 from components.export.kml import kml_text
 from components.export.mcap_export import mcap_bytes
-from components.sensor.marks import EO, RADAR, TRACKER
-from components.view.page import page_part
+from components.sensor.palette import EO, RADAR, TRACKER
+from components.view.page import read_page_file
 from tests.view.test_page import SCENE as WATCHED
 
 SPACE = {"k": "http://www.opengis.net/kml/2.2", "gx": "http://www.google.com/kml/ext/2.2"}
@@ -277,7 +277,7 @@ def test_the_geoid_is_given_or_the_terrain_s_or_taken_for_the_ellipsoid(
 ):
     tables = crafted(tmp_path)
     (tmp_path / "scene.toml").write_text(terrain + SCENE)
-    words, found_m = _geoid(tables, given_m)
+    words, found_m = _geoid_note_and_height_m(tables, given_m)
     assert found_m == geoid_m and said in words and bool(words) is bool(said)
 
 
@@ -336,7 +336,7 @@ def test_options_that_do_not_fit_are_refused(run, tmp_path, options, said):
 
 def test_colours_on_dark_are_those_of_the_page():
     """One kit: what the page shows in its dark theme, globes show alike."""
-    style = page_part("components.view", "style.css")
+    style = read_page_file("components.view", "style.css")
     dark = style[style.index('[data-theme="dark"]') :]
     levels = {f"level{k}": colour for k, colour in enumerate(LEVELS_ON_DARK, start=1)}
     for name, colour in (ON_DARK | levels).items():

@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from dsa_des.files.input_files import cache_reads
+from dsa_des.files.input_files import cache_file_reads
 
 
 def test_a_file_is_read_again_when_it_changed(tmp_path: Path) -> None:
     reads = []
 
-    @cache_reads(2)
+    @cache_file_reads(2)
     def shouted(path: Path, end: str = "!") -> str:
         reads.append(path.name)
         return path.read_text() + end
@@ -32,7 +32,7 @@ def test_a_file_is_read_again_when_it_changed(tmp_path: Path) -> None:
 
 
 def test_what_is_wrong_is_said_by_the_reader(tmp_path: Path) -> None:
-    read = cache_reads(2)(Path.read_text)
+    read = cache_file_reads(2)(Path.read_text)
     with pytest.raises(FileNotFoundError, match="missing"):
         read(tmp_path / "missing")
     with pytest.raises(ValueError, match="null"):

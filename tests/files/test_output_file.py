@@ -7,7 +7,7 @@ import pytest
 
 from dsa_des.errors import UsageError
 from dsa_des.files import output_file
-from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_file import check_file_writable, write_file
 
 
 def left_in(folder):
@@ -61,10 +61,10 @@ def test_what_can_be_no_file_is_refused_beforehand(name, match, tmp_path):
     (tmp_path / "to file").symlink_to("file")
     before = left_in(tmp_path)
     with pytest.raises(UsageError, match=match):
-        check_file(tmp_path / name)
+        check_file_writable(tmp_path / name)
     assert left_in(tmp_path) == before
     for good in ("file", "new", "to file"):
-        check_file(tmp_path / good)
+        check_file_writable(tmp_path / good)
     assert left_in(tmp_path) == before
 
 
@@ -78,12 +78,12 @@ def test_names_in_folders_of_the_system_are_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(output_file, "_ORDINARY", (str(tmp_path / "dev" / "shm"),))
     for name in ("dev/stdout", "elsewhere/stdout", "dev/new"):
         with pytest.raises(UsageError, match="is in a folder of the system"):
-            check_file(tmp_path / name)
-    check_file(tmp_path / "dev" / "shm" / "x")
+            check_file_writable(tmp_path / name)
+    check_file_writable(tmp_path / "dev" / "shm" / "x")
     assert output_file._SYSTEM and left_in(tmp_path / "dev") == ["shm", "stdout"]
 
 
 def test_the_real_folders_of_the_system_are_known():
     for name in ("/dev/stdout", "/dev/null", "/proc/self/fd/1", "/dev/fd/1"):
         with pytest.raises(UsageError, match=r"of the system|of a file is needed"):
-            check_file(Path(name))  # it looks and writes nothing
+            check_file_writable(Path(name))  # it looks and writes nothing

@@ -12,8 +12,8 @@ import pytest
 
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files import output_names
-from dsa_des.files.output_folder import OutputFolder, new_folder
-from dsa_des.files.output_names import claim_folder, new_folder_name, user_path
+from dsa_des.files.output_folder import OutputFolder, make_results_folder
+from dsa_des.files.output_names import make_numbered_folder, new_folder_name, user_path
 from dsa_des.record.run_folder import write_run_json
 
 
@@ -27,7 +27,7 @@ def fill(folder, text="one"):
 
 
 def write(target, text="one"):
-    with OutputFolder(target).writing() as folder:
+    with OutputFolder(target).write_then_rename() as folder:
         fill(folder, text)
 
 
@@ -37,7 +37,7 @@ def text_of(folder):
 
 def test_a_folder_takes_its_name_when_it_is_complete(tmp_path):
     target = tmp_path / "new" / "deep" / "run"
-    with OutputFolder(target).writing() as folder:
+    with OutputFolder(target).write_then_rename() as folder:
         assert target not in (folder, *folder.parents) and target.parent in folder.parents
         assert not target.exists()
         fill(folder)
@@ -49,7 +49,7 @@ def test_a_folder_takes_its_name_when_it_is_complete(tmp_path):
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt, SystemExit])
 def test_nothing_is_left_when_the_block_raises(error, tmp_path):
-    with pytest.raises(error), OutputFolder(tmp_path / "a" / "b").writing() as folder:
+    with pytest.raises(error), OutputFolder(tmp_path / "a" / "b").write_then_rename() as folder:
         fill(folder)
         raise error
     assert left_in(tmp_path) == []
@@ -58,7 +58,7 @@ def test_nothing_is_left_when_the_block_raises(error, tmp_path):
 def test_an_earlier_run_is_replaced_only_by_a_complete_one(tmp_path):
     target = tmp_path / "run"
     write(target, "one")
-    with pytest.raises(RuntimeError), OutputFolder(target).writing():
+    with pytest.raises(RuntimeError), OutputFolder(target).write_then_rename():
         raise RuntimeError
     assert text_of(target) == "one"
     write(target, "two")
@@ -106,9 +106,9 @@ def test_numbers_count_up_past_whatever_has_the_name(tmp_path):
 
 def test_two_runs_at_once_without_a_name_both_stay(tmp_path):
     first, second = (OutputFolder(tmp_path / "runs", "scene") for _ in range(2))
-    with first.writing() as folder:
+    with first.write_then_rename() as folder:
         fill(folder, "first")
-        with second.writing() as other:
+        with second.write_then_rename() as other:
             fill(other, "second")
     assert first.path != second.path
     assert (text_of(first.path), text_of(second.path)) == ("first", "second")
@@ -116,7 +116,7 @@ def test_two_runs_at_once_without_a_name_both_stay(tmp_path):
 
 
 def test_a_failed_run_takes_no_number(tmp_path):
-    with pytest.raises(RuntimeError), OutputFolder(tmp_path / "runs", "scene").writing():
+    with pytest.raises(RuntimeError), OutputFolder(tmp_path / "runs", "scene").write_then_rename():
         raise RuntimeError
     assert left_in(tmp_path) == []
 
@@ -162,7 +162,10 @@ def test_ten_processes_at_once_get_ten_folders(tmp_path):
 def test_a_run_that_appeared_under_the_same_name_meanwhile_stays_and_so_does_ours(tmp_path):
     target = tmp_path / "run"
     ours = OutputFolder(target)
-    with pytest.raises(OutputError, match=r"the results are in .*run-001"), ours.writing() as one:
+    with (
+        pytest.raises(OutputError, match=r"the results are in .*run-001"),
+        ours.write_then_rename() as one,
+    ):
         fill(one, "ours")
         write(target, "theirs")
     assert text_of(target) == "theirs"
@@ -173,7 +176,10 @@ def test_a_run_that_appeared_under_the_same_name_meanwhile_stays_and_so_does_our
 def test_what_somebody_put_into_the_earlier_run_meanwhile_stays(tmp_path):
     target = tmp_path / "run"
     write(target, "earlier")
-    with pytest.raises(OutputError, match="run-001"), OutputFolder(target).writing() as folder:
+    with (
+        pytest.raises(OutputError, match="run-001"),
+        OutputFolder(target).write_then_rename() as folder,
+    ):
         fill(folder, "later")
         (target / "notes.txt").write_text("mine")
     assert left_in(target) == ["notes.txt", "run.json", "scene.toml"]
@@ -185,7 +191,7 @@ def test_what_somebody_put_into_the_earlier_run_meanwhile_stays(tmp_path):
 
 def refused(target, match):
     """A place that is refused before anything is done."""
-    with pytest.raises(UsageError, match=match), OutputFolder(target).writing():
+    with pytest.raises(UsageError, match=match), OutputFolder(target).write_then_rename():
         pytest.fail("the block was entered")
 
 
@@ -311,23 +317,23 @@ def test_no_permission_is_found_out_before_the_run(restricted):
 
 def test_a_claimed_folder_is_new(tmp_path):
     (tmp_path / "compare-001").mkdir()
-    assert claim_folder(tmp_path, "compare") == tmp_path / "compare-002"
+    assert make_numbered_folder(tmp_path, "compare") == tmp_path / "compare-002"
     (tmp_path / "file").write_text("")
     for place in (tmp_path / "file", tmp_path / "file" / "x"):
         with pytest.raises(UsageError):
-            claim_folder(place, "compare")
+            make_numbered_folder(place, "compare")
 
 
 def test_a_new_folder_that_nothing_came_into_is_gone_again(tmp_path):
     for out in (None, str(tmp_path / "a" / "b")):
         with (
             pytest.raises(UsageError, match="bad"),
-            new_folder(out, tmp_path / "studies", "x") as folder,
+            make_results_folder(out, tmp_path / "studies", "x") as folder,
         ):
             assert left_in(folder) == []
             raise UsageError("bad")
     assert left_in(tmp_path) == []
-    with new_folder(None, tmp_path / "studies", "x") as folder:
+    with make_results_folder(None, tmp_path / "studies", "x") as folder:
         (folder / "result").write_text("")
     assert left_in(tmp_path / "studies" / "x-001") == ["result"]
 
@@ -341,9 +347,9 @@ def test_a_new_folder_must_be_new(name, tmp_path):
     (tmp_path / "link").symlink_to("empty")
     (tmp_path / "dangling").symlink_to("nowhere")
     before = left_in(tmp_path)
-    with pytest.raises(UsageError), new_folder(str(tmp_path / name), tmp_path, "x"):
+    with pytest.raises(UsageError), make_results_folder(str(tmp_path / name), tmp_path, "x"):
         pytest.fail("the block was entered")
     assert left_in(tmp_path) == before and left_in(tmp_path / "empty") == []
-    with new_folder(str(tmp_path / "empty"), tmp_path, "x") as folder:
+    with make_results_folder(str(tmp_path / "empty"), tmp_path, "x") as folder:
         assert folder == tmp_path / "empty"
     assert (tmp_path / "empty").is_dir()  # it was not ours to remove

@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from dsa_des.cli import main
-from dsa_des.files.sealed_files import is_sealed, seal_content, sealable_parquet
+from dsa_des.files.sealed_files import is_sealed, seal_parquet, sealable_parquet
 from tests.studies.conftest import small
 
 __all__ = ["small"]
@@ -112,7 +112,7 @@ def test_what_is_no_part_is_left_alone_and_told(whole: dict[str, bytes]) -> None
 @given(st.data())
 def test_every_changed_byte_breaks_the_seal(data: st.DataObject) -> None:
     table = pa.table({"a": [1, 2], "b": ["dsa_des.sha256\x18@" + "0" * 64, None]})
-    content = seal_content(sealable_parquet(table), "me")
+    content = seal_parquet(sealable_parquet(table), "me")
     assert is_sealed(content, "me") and not is_sealed(content, "you")
     assert pq.read_table(pa.BufferReader(content)).to_pydict() == table.to_pydict()
     place = data.draw(st.integers(0, len(content) - 1))

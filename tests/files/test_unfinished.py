@@ -10,7 +10,12 @@ from pathlib import Path
 import pytest
 
 from dsa_des.files import output_file as module
-from dsa_des.files.output_file import EARLIER, PREFIX, remove_abandoned, temporary_folder
+from dsa_des.files.output_file import (
+    EARLIER,
+    PREFIX,
+    remove_abandoned_temporary_files,
+    temporary_folder,
+)
 from dsa_des.files.output_folder import OutputFolder
 
 DYING = """
@@ -38,16 +43,19 @@ def killed(place, name="run", more="pass"):
 
 def test_the_next_run_into_the_same_place_removes_what_a_killed_one_left(tmp_path):
     killed(tmp_path)
-    with OutputFolder(tmp_path / "other").writing() as folder:
+    with OutputFolder(tmp_path / "other").write_then_rename() as folder:
         assert left_in(tmp_path) == [folder.parent.name]
     assert left_in(tmp_path) == ["other"]
 
 
 def test_what_a_living_process_is_at_stays(tmp_path):
     with temporary_folder(tmp_path / "run") as folder:
-        code = f"from dsa_des.files.output_file import *; remove_abandoned(Path({str(tmp_path)!r}))"
+        code = (
+            "from dsa_des.files.output_file import *; "
+            f"remove_abandoned_temporary_files(Path({str(tmp_path)!r}))"
+        )
         subprocess.run([sys.executable, "-c", code], check=True)
-        remove_abandoned(tmp_path)  # not even this process takes it for left over
+        remove_abandoned_temporary_files(tmp_path)  # not even this process takes it for left over
         assert left_in(folder) == ["lock"]
     assert left_in(tmp_path) == []
 
@@ -55,10 +63,10 @@ def test_what_a_living_process_is_at_stays(tmp_path):
 def test_what_another_machine_is_at_stays(tmp_path, monkeypatch):
     killed(tmp_path)
     monkeypatch.setattr(module, "_host_name", lambda: "somewhere else")
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert len(left_in(tmp_path)) == 1
     monkeypatch.undo()
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert left_in(tmp_path) == []
 
 
@@ -79,7 +87,7 @@ def test_an_earlier_run_is_put_back_if_its_replacement_never_came(tmp_path):
     (tmp_path / "run" / "result").write_text("earlier")
     killed(tmp_path, more=f"Path('run').rename(folder / '{EARLIER}')")
     assert not (tmp_path / "run").exists()
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert (tmp_path / "run" / "result").read_text() == "earlier"
     assert left_in(tmp_path) == ["run"]
 
@@ -91,10 +99,10 @@ def test_what_only_looks_like_ours_stays(content, tmp_path):
     (folder / "lock").write_text(content)
     (folder / "work").write_text("years of it")
     (tmp_path / f"{PREFIX}link").symlink_to(folder)
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert left_in(folder) == ["lock", "work"]
     (folder / "lock").unlink()
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert left_in(folder) == ["work"]
 
 
@@ -106,7 +114,7 @@ def test_links_in_what_was_left_are_not_followed(tmp_path):
     about = json.loads(lock.read_text())
     lock.write_text(json.dumps({**about, "target": "../../escaped"}))
     (folder / EARLIER).mkdir()
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert left_in(tmp_path) == ["escaped", "precious"]
     assert left_in(tmp_path / "precious") == ["work"]
 
@@ -119,7 +127,7 @@ def test_folders_whose_maker_was_killed_at_once_and_old_files_go_as_well(tmp_pat
         (tmp_path / f"{PREFIX}{name}").write_text("")
         then = time.time() - age_s
         os.utime(tmp_path / f"{PREFIX}{name}", (then, then))
-    remove_abandoned(tmp_path)
+    remove_abandoned_temporary_files(tmp_path)
     assert left_in(tmp_path) == [f"{PREFIX}new"]
 
 

@@ -224,7 +224,7 @@ def test_culling_changes_nothing_but_the_counts(
 def test_keys_of_draws_are_made_for_those_who_are_drawn_for() -> None:
     roster = Roster.from_pairs([(f"t{i}", Aircraft()) for i in range(50)])
     some = np.array([7, 3, 7, 49])
-    keys = roster.keys_of(some)
+    keys = roster.draw_keys_of(some)
     assert "keys" not in vars(roster)
-    np.testing.assert_array_equal(roster.keys_of(np.array([3, 4])), roster.keys[[3, 4]])
+    np.testing.assert_array_equal(roster.draw_keys_of(np.array([3, 4])), roster.keys[[3, 4]])
     np.testing.assert_array_equal(keys, roster.keys[some])

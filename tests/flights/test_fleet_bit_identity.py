@@ -107,15 +107,15 @@ def test_flights_made_together_lie_in_memory_once():
     times, rng = np.arange(0.0, 60.0), np.random.default_rng(2)
     position = [rng.uniform(-1, 1, (60, 5)).cumsum(axis=0) * 1e-4 + of for of in (52, 179.99, 900)]
     names = [*"abcde"]
-    made = SampledTrajectory.make_all(names, times, *position)
+    made = SampledTrajectory.from_common_times(names, times, *position)
     alone = [
         SampledTrajectory(name, times, *(part[:, k] for part in position))
         for k, name in enumerate(names)
     ]
     own, others = SampledFleet(made[::2]), SampledFleet([made[3], made[1], made[3]])
-    table = own._table[0]
+    table = own._coefficients_and_shifts[0]
     for fleet, which in ((own, [0, 2, 4]), (others, [3, 1, 3]), (SampledFleet(made), range(5))):
-        assert fleet._table[0] is table
+        assert fleet._coefficients_and_shifts[0] is table
         assert_same(fleet, np.linspace(-1, 61, 130))
         assert_each_same(fleet, -1, 61)
         for one, number in zip(fleet, which, strict=True):
@@ -126,9 +126,11 @@ def test_flights_made_together_lie_in_memory_once():
                 assert mine.tobytes() == other.tobytes()
             assert one.max_speed_mps == alone[number].max_speed_mps
     mixed = SampledFleet([made[1], alone[0], made[1]])
-    assert len(mixed._table[0]) == 2 * len(times)  # who flies in several runs is there once
+    assert len(mixed._coefficients_and_shifts[0]) == 2 * len(
+        times
+    )  # who flies in several runs is there once
     assert_each_same(mixed, -1, 61)
-    assert np.shares_memory(alone[0].coefficients, mixed._table[0])
+    assert np.shares_memory(alone[0].coefficients, mixed._coefficients_and_shifts[0])
     assert_each_same(own, -1, 61)
     assert_each_same(others, -1, 61)  # one of whose flights is in another table now
-    assert SampledFleet([made[0], made[2]])._table[0] is table
+    assert SampledFleet([made[0], made[2]])._coefficients_and_shifts[0] is table

@@ -28,7 +28,9 @@ def same(one, other):
 
 def test_sampled_together_are_those_made_alone():
     lat, lon, alt = paths(207, np.random.default_rng(5))
-    together = SampledTrajectory.make_all([f"a{k}" for k in range(207)], TIMES, lat, lon, alt)
+    together = SampledTrajectory.from_common_times(
+        [f"a{k}" for k in range(207)], TIMES, lat, lon, alt
+    )
     for k in (0, 1, 3, 120, 198, 199, 200, 206):  # blocks of cells end at 199
         alone = SampledTrajectory(f"a{k}", TIMES, lat[:, k], lon[:, k], alt[:, k])
         for name in ("coefficients", "lon_deg", "yaw_rad", "pitch_rad", "roll_rad"):
@@ -41,7 +43,7 @@ def test_a_bad_sample_of_one_names_it():
     lat, lon, alt = paths(3, np.random.default_rng(5))
     lat[7, 2] = 91.0
     with pytest.raises(ValueError, match=r"c: lat_deg is 91.0 \(sample 7\)"):
-        SampledTrajectory.make_all(["a", "b", "c"], TIMES, lat, lon, alt)
+        SampledTrajectory.from_common_times(["a", "b", "c"], TIMES, lat, lon, alt)
 
 
 class Still:
@@ -56,7 +58,7 @@ class Still:
 
 def test_flights_of_all_kinds_are_asked_together():
     lat, lon, alt = paths(2, np.random.default_rng(8))
-    sampled = SampledTrajectory.make_all(["a", "b"], TIMES, lat, lon, alt)
+    sampled = SampledTrajectory.from_common_times(["a", "b"], TIMES, lat, lon, alt)
     legs = [Straight(duration_s=9), Turn(rate_deg_s=3, duration_s=9), Straight()]
     scripted = [
         ScriptedTrajectory(
@@ -84,7 +86,7 @@ def test_flights_of_all_kinds_are_asked_together():
 def test_a_fleet_of_all_kinds_says_what_scripts_fix():
     """Ground speeds and fixed angles, NaN where no script says them."""
     lat, lon, alt = paths(1, np.random.default_rng(8))
-    (sampled,) = SampledTrajectory.make_all(["a"], TIMES, lat, lon, alt)
+    (sampled,) = SampledTrajectory.from_common_times(["a"], TIMES, lat, lon, alt)
     start = {"lat_deg": -66.0, "lon_deg": 179.9, "alt_m": 900.0, "heading_deg": 217.0}
     slow = ScriptedTrajectory("slow", **start, speed_mps=40.0, roll_deg=9.0)
     fast = ScriptedTrajectory("fast", **start, speed_mps=70.0)

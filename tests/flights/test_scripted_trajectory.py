@@ -13,7 +13,7 @@ from components.flights.attitude import Wind
 from components.flights.legs import Climb, Stationary, Straight, Turn, Waypoint, Waypoints
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic.scripted import Intruder, _intruders
+from components.traffic.scripted import Intruder, _intruder_fleet
 
 WGS84 = Geodesic.WGS84
 START = {"lat_deg": 45.0, "lon_deg": -75.0, "alt_m": 1000.0}
@@ -289,7 +289,7 @@ def test_an_intruder_s_waypoints_count_from_the_ownship_s_start():
     craft = Intruder(
         name="to", east_m=2000.0, north_m=0.0, up_m=0.0, heading_deg=90.0, speed_mps=60.0, legs=legs
     )
-    fleet = _intruders([craft], reference, Wind.from_direction(10.0, 270.0))
+    fleet = _intruder_fleet([craft], reference, Wind.from_direction(10.0, 270.0))
     state = fleet.each(np.array([0]), np.array([30.0]))
     east, north, _ = pymap3d.geodetic2enu(
         state.lat_deg[0], state.lon_deg[0], state.alt_m[0], *reference

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from components.flights.geodesic_motion import geodesic_parameters
 from components.flights.leg_motion import turn_parameters
-from components.flights.legs import Straight, Turn, fly_each
+from components.flights.legs import Straight, Turn, segments_of_each
 from components.flights.many_flights import straight_fleet
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 
@@ -127,7 +127,7 @@ def test_turns_and_scripts_that_are_flown_together_have_the_bits_of_each_alone()
     alone = [turn_parameters(*row) for row in zip(*(of.tolist() for of in columns), strict=True)]
     assert turn_parameters(*columns).tobytes() == np.stack(alone, axis=1).tobytes()
     legs = [legs_of(number % 6) for number in range(12)]
-    together = fly_each((lat, lon, alt), np.radians(np.degrees(heading) % 360.0), legs)
+    together = segments_of_each((lat, lon, alt), np.radians(np.degrees(heading) % 360.0), legs)
     for k, segments in enumerate(together):
         flight = ScriptedTrajectory(
             "a", lat_deg=lat[k], lon_deg=lon[k], alt_m=alt[k], speed_mps=1.0,

@@ -49,8 +49,8 @@ def test_what_is_said_of_single_aircraft_is_said_once():
     notes.note_aircraft("c", "gap", "a gap of 9 s")
     notes.note_aircraft("d", "turn", "turns", harmless=True)
     other.note_aircraft("e", "gap", "a gap of 2 s")
-    notes.settle()
+    notes.summarize_aircraft_notes()
     notes.add(other, "own.csv")
-    notes.settle()
+    notes.summarize_aircraft_notes()
     assert notes.warnings == ["a: a gap of 9 s (and 2 more aircraft)", "own.csv: e: a gap of 2 s"]
     assert notes.harmless == ["d: turns"]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from wired import chain, run
 
-from components.fusion.recent import split_used_rows
+from components.fusion.recent_detections import split_used_rows
 
 SLOW = {"name": "slow", "north_m": 5000.0, "east_m": 700.0, "up_m": 150.0, "heading_deg": 190.0,
         "speed_mps": 60.0}  # fmt: skip

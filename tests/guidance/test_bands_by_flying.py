@@ -17,7 +17,7 @@ from components.guidance.intervals import (
     is_same_value,
     paint_bands,
 )
-from components.guidance.manoeuvre_kinds import kind_of
+from components.guidance.manoeuvre_kinds import manoeuvres_of_kind
 from components.guidance.situation import Detector, State
 from components.well_clear.relative_motion import nearly_equal
 from components.well_clear.volume import Volume, violates
@@ -83,7 +83,7 @@ def test_both_sides_of_every_edge_are_as_they_are_flown(kind, variable):
     edges = 0
     for intruder in (CROSSING, BELOW, NEAR):
         values = {**VALUES, "lookahead_time": LOOKAHEAD_S}
-        made = kind_of(kind, one_row(OWN), values)
+        made = manoeuvres_of_kind(kind, one_row(OWN), values)
         conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
         clear = ~conflicts.is_unsafe(0.0, HORIZON_S)[0]
         zero = int(np.argmin(np.abs(made.values[0] - made.own_value)))
@@ -108,7 +108,9 @@ def test_flights_to_altitudes_are_smooth_and_end_there():
         most = VALUES["vertical_accel"]
         for place in range(0, len(targets), 7):
             time_s = np.linspace(0.0, t3[place] + 1.0, 4001)
-            flights = [made.flight_at(np.full((1, len(targets)), t)) for t in time_s[::100]]
+            flights = [
+                made.straight_flight_from(np.full((1, len(targets)), t)) for t in time_s[::100]
+            ]
             up = np.array(
                 [
                     f.up_m[0, place] + f.climb_mps[0, place] * t
@@ -135,8 +137,8 @@ def test_altitudes_that_others_stand_for_are_flown_like_them(climb, up):
     ).all()
     assert made.select_examined(made.values).shape[1] < every.select_examined(every.values).shape[1]
     for time_s in (0.0, 0.7, 5.0, 31.0, 60.0):
-        few = made.flight_at(np.full((1, 1), time_s))
-        all_of_them = every.flight_at(np.full((1, 1), time_s))
+        few = made.straight_flight_from(np.full((1, 1), time_s))
+        all_of_them = every.straight_flight_from(np.full((1, 1), time_s))
         for name in ("up_m", "climb_mps"):
             assert made.spread_to_all(getattr(few, name)) == pytest.approx(
                 getattr(all_of_them, name)

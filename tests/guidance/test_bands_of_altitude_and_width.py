@@ -8,7 +8,7 @@ import pytest
 
 from components.alert_configuration.conf_file import read_conf
 from components.guidance.bands import guidance_of_many
-from components.guidance.manoeuvre_kinds import KINDS, kind_of
+from components.guidance.manoeuvre_kinds import KINDS, manoeuvres_of_kind
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import Detector, State
 from components.well_clear.volume import Volume, violates
@@ -61,7 +61,7 @@ def test_altitudes_on_both_sides_of_every_edge_are_as_they_are_flown(climb):
     volume = Volume(*SIZES, "none")
     edges = 0
     for intruder in (CROSSING, BELOW, NEAR, ABOVE):
-        made = kind_of("alt", one_row(own), values)
+        made = manoeuvres_of_kind("alt", one_row(own), values)
         conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
         clear = ~conflicts.is_unsafe(0.0, LOOKAHEAD_S)[0]
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
@@ -92,7 +92,7 @@ def test_altitudes_on_both_sides_of_every_edge_are_as_they_are_flown(climb):
 def test_altitudes_that_are_taken_at_once_meet_who_is_level_with_them_while_near(intruder, at_once):
     """Level all the time, so the volume is met at the heights flown through while it is near."""
     values = {**VALUES, "lookahead_time": LOOKAHEAD_S, at_once: 0.0}
-    made = kind_of("alt", one_row(OWN), values)
+    made = manoeuvres_of_kind("alt", one_row(OWN), values)
     volume = Volume(*SIZES, "none")
     conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
     found = conflicts.is_unsafe(0.0, LOOKAHEAD_S)[0]

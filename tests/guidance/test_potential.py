@@ -5,8 +5,14 @@ import math
 import numpy as np
 import pytest
 
-from components.guidance.mvp import _dense
-from components.guidance.potential import KeptApart, Others, conflicts, may_resume, push_velocity
+from components.guidance.mvp import _others_by_target
+from components.guidance.potential import (
+    KeptApart,
+    Others,
+    conflict_mask,
+    may_resume,
+    push_velocity,
+)
 from components.messages.alerts import AlertLevels
 
 KEPT = KeptApart(50.0, 1.05, 120.0)
@@ -59,7 +65,7 @@ def drawn(seed, n=400, others=3):
 
 def test_all_three_follow_the_formulas_pair_by_pair():
     others, own = drawn(1)
-    now, done = conflicts(others, KEPT), may_resume(others, own, KEPT)
+    now, done = conflict_mask(others, KEPT), may_resume(others, own, KEPT)
     out = push_velocity(others, own, now, KEPT)
     assert 0.2 < now.mean() < 0.8 and 0.02 < done.mean() < 0.8
     for k in range(own.shape[1]):
@@ -105,15 +111,15 @@ def test_inside_already_the_push_is_what_is_missing_of_the_radius():
     """At 30 m, passing 12 m beside in 1 s: (52.5 - 12) / 1 against it."""
     side, along = 12.0, math.sqrt(30.0**2 - 12.0**2)
     inside = one(side, along, 0, -along)
-    assert conflicts(inside, KEPT).all()
+    assert conflict_mask(inside, KEPT).all()
     out = push_velocity(inside, np.array([[3.0], [4.0]]), np.array([[True]]), KEPT)
     np.testing.assert_allclose(out[:, 0], [3.0 - 40.5, 4.0])
 
 
 def test_far_ahead_and_past_are_no_conflicts_and_a_parallel_one_is_kept_longer():
-    assert conflicts(one(0, 2400, 0, -20), KEPT).all()  # its edge is met after 117.5 s
-    assert not conflicts(one(0, 2500, 0, -20), KEPT).any()
-    assert not conflicts(one(0, 80, 0, 20), KEPT).any()
+    assert conflict_mask(one(0, 2400, 0, -20), KEPT).all()  # its edge is met after 117.5 s
+    assert not conflict_mask(one(0, 2500, 0, -20), KEPT).any()
+    assert not conflict_mask(one(0, 80, 0, 20), KEPT).any()
     ahead = np.array([[0.0], [10.0]])
     assert may_resume(one(0, 51, 0, 5), ahead, KEPT).tolist() == [[False]]
     assert may_resume(one(0, 53, 0, 5), ahead, KEPT).tolist() == [[True]]
@@ -128,7 +134,7 @@ def test_what_alerts_say_stands_by_contact(tracks):
     class Alerts(list):
         row_of_entries, target = np.array([0, 1]), np.array([0, 1] if tracks is None else [-1, -1])
         numbers = {} if tracks is None else {"track": np.array(tracks)}
-        contacts = AlertLevels.contacts
+        contact_numbers = AlertLevels.contact_numbers
         relative = {
             "east_m": np.array([1.0, 3.0]), "north_m": np.array([4.0, 6.0]),
             "east_mps": np.array([7.0, 9.0]), "north_mps": np.array([-1.0, -3.0]),
@@ -136,7 +142,7 @@ def test_what_alerts_say_stands_by_contact(tracks):
         own_motion = {"east_mps": np.array([10.0, 20.0]), "north_mps": np.array([30.0, 40.0])}
 
     alerts, nan = Alerts([None, None]), math.nan
-    others, own, heard = _dense(alerts, alerts.contacts())
+    others, own, heard = _others_by_target(alerts, alerts.contact_numbers())
     assert heard.tolist() == [[True, False], [False, True]]
     np.testing.assert_array_equal(
         others.position_m, [[[-1.0, nan], [nan, -3.0]], [[-4.0, nan], [nan, -6.0]]]

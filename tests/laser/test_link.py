@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from components.laser.range_equation import (
-    laser_power_w,
+    beam_share_on_target,
+    beam_share_on_wire,
+    mean_shots_on_target,
+    received_laser_power_w,
     scan_detection_probability,
-    shots_on_target,
-    target_share,
-    wire_share,
 )
 
 BEAM = 1.5e-3
@@ -31,11 +31,11 @@ def power_by_rays(inside, range_m, reflectivity):
 @pytest.mark.parametrize("range_m", [80.0, 300.0])
 def test_an_echo_is_the_sum_over_the_beam_s_rays(range_m):
     for share, inside in (
-        (target_share(0.02, range_m, BEAM), lambda x, y: x * x + y * y <= 0.02 / math.pi),
-        (target_share(1e4, range_m, BEAM), lambda x, y: x == x),
-        (wire_share(0.01, range_m, BEAM), lambda x, y: np.abs(y) <= 0.005),
+        (beam_share_on_target(0.02, range_m, BEAM), lambda x, y: x * x + y * y <= 0.02 / math.pi),
+        (beam_share_on_target(1e4, range_m, BEAM), lambda x, y: x == x),
+        (beam_share_on_wire(0.01, range_m, BEAM), lambda x, y: np.abs(y) <= 0.005),
     ):  # fmt: skip
-        found = laser_power_w(share, range_m, reflectivity=0.2, **LASER)
+        found = received_laser_power_w(share, range_m, reflectivity=0.2, **LASER)
         assert found == pytest.approx(power_by_rays(inside, range_m, 0.2), rel=0.02)
 
 
@@ -43,13 +43,13 @@ def test_an_echo_is_the_sum_over_the_beam_s_rays(range_m):
 def test_echoes_fall_by_their_kind_s_power_of_range(kind, power):
     range_m = np.array([500.0, 1000.0])
     share = {
-        "large": target_share(1e3, range_m, BEAM),
-        "wire": wire_share(0.01, range_m, BEAM),
-        "small": target_share(0.01, range_m, BEAM),
+        "large": beam_share_on_target(1e3, range_m, BEAM),
+        "wire": beam_share_on_wire(0.01, range_m, BEAM),
+        "small": beam_share_on_target(0.01, range_m, BEAM),
     }[kind]
-    near, far = laser_power_w(share, range_m, **LASER)
+    near, far = received_laser_power_w(share, range_m, **LASER)
     assert near / far == pytest.approx(2.0**power)
-    near, far = laser_power_w(share, range_m, extinction_per_m=1e-3, **LASER)
+    near, far = received_laser_power_w(share, range_m, extinction_per_m=1e-3, **LASER)
     assert near / far == pytest.approx(2.0**power * math.e)
 
 
@@ -67,9 +67,10 @@ def test_a_drawn_pattern_hits_as_often_and_as_much_as_the_mean_says():
         light_of["wire"] += chord[np.abs(x) <= 0.5 * length].sum() * thick / disc_area
         light_of["disc"] += np.count_nonzero(np.hypot(x, y) <= 0.5 * BEAM) * 1e-9 / disc_area
     shots = {
-        "wire": shots_on_target(length * thick, length * 0.25 * math.pi * BEAM, step.prod())
-        * wire_share(thick, 1.0, BEAM),
-        "disc": shots_on_target(1e-9, disc_area, step.prod()) * target_share(1e-9, 1.0, BEAM),
+        "wire": mean_shots_on_target(length * thick, length * 0.25 * math.pi * BEAM, step.prod())
+        * beam_share_on_wire(thick, 1.0, BEAM),
+        "disc": mean_shots_on_target(1e-9, disc_area, step.prod())
+        * beam_share_on_target(1e-9, 1.0, BEAM),
     }
     for kind, light in light_of.items():
         assert light / tries == pytest.approx(shots[kind], rel=0.05), kind
@@ -89,10 +90,10 @@ def test_a_scan_s_probability_is_that_of_drawn_amplitudes():
 
 def test_what_is_out_of_range_is_refused_by_name():
     for call, name in (
-        (lambda: wire_share(-0.1, 10.0, BEAM), "diameter_m"),
-        (lambda: target_share(1.0, 0.0, BEAM), "range_m"),
-        (lambda: laser_power_w(0.1, 10.0, **{**LASER, "aperture_m": 0.0}), "aperture_m"),
-        (lambda: shots_on_target(1.0, 1.0, 0.0), "spacing_rad2"),
+        (lambda: beam_share_on_wire(-0.1, 10.0, BEAM), "diameter_m"),
+        (lambda: beam_share_on_target(1.0, 0.0, BEAM), "range_m"),
+        (lambda: received_laser_power_w(0.1, 10.0, **{**LASER, "aperture_m": 0.0}), "aperture_m"),
+        (lambda: mean_shots_on_target(1.0, 1.0, 0.0), "spacing_rad2"),
         (lambda: scan_detection_probability(math.nan, 1.0, threshold=4.0), "snr"),
     ):
         with pytest.raises(ValueError, match=name):

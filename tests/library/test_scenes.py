@@ -79,7 +79,7 @@ def test_classes_that_no_other_process_finds(short, own):
     for cls in (own.OwnRadar, Inner):
         scene = short.swap(radar=cls).set({"seed": 3})
         assert scene.blocks["radar"].cls is cls
-        assert scene.resolved()["blocks"]["radar"]["type"] == cls.path()
+        assert scene.resolved()["blocks"]["radar"]["type"] == cls.import_path()
     table = {**short.origin[0].data}
     table["blocks"] = {**table["blocks"], "radar": {**table["blocks"]["radar"], "type": Inner}}
     assert dsa_des.load_scene(table).blocks["radar"].cls is Inner

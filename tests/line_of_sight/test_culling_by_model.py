@@ -13,8 +13,8 @@ from components.aircraft.known_targets import KnownTraffic
 from components.geometry import ellipsoid
 from components.geometry.earth_models import LineOfSight
 from components.geometry.ellipsoid import enu_to_geodetic
-from components.geometry.error_bounds import true_reach_m
-from components.line_of_sight.model_choice import seeming_look
+from components.geometry.error_bounds import max_true_range_m
+from components.line_of_sight.model_choice import convert_model_ranges
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -76,7 +76,7 @@ def test_who_seems_to_be_in_reach_is_within_the_true_reach(model: str) -> None:
     for reach_m in (2e3, 15e3, 60e3):
         for lat in (-70.0, 0.0, 40.0, 80.0):
             own = (rng.uniform(lat - 0.5, lat + 0.5, pairs), 170.0, rng.uniform(0, 9e3, pairs))
-            true_m = true_reach_m(model, reach_m, (lat - 0.5, lat + 0.5), (0.0, 9e3))
+            true_m = max_true_range_m(model, reach_m, (lat - 0.5, lat + 0.5), (0.0, 9e3))
             assert reach_m < true_m < 1.2 * reach_m
             distance, bearing = rng.uniform(0.8, 1.3, pairs) * reach_m, rng.uniform(0, 6.28, pairs)
             up = rng.uniform(-0.3, 0.3, pairs) * distance
@@ -93,11 +93,11 @@ def test_who_seems_to_be_in_reach_is_within_the_true_reach(model: str) -> None:
 
 def test_nothing_is_proven_at_a_pole_and_the_exact_form_needs_no_proof() -> None:
     look, envelope = FarthestLook(15e3), SimpleNamespace()
-    assert true_reach_m("flat_earth", 15e3, (89.95, 89.99), (0.0, 100.0)) == math.inf
+    assert max_true_range_m("flat_earth", 15e3, (89.95, 89.99), (0.0, 100.0)) == math.inf
     offer = KnownTraffic(Roster.from_pairs([]), lambda _reach, _lasts: envelope)
     context: Any = SimpleNamespace(producers=[SimpleNamespace(offer=offer)])
-    assert seeming_look(context, "flat_earth", look).seeming == (("flat_earth", 15e3),)
-    assert seeming_look(context, "ellipsoid", look) == look
-    assert not offer.was_asked
+    assert convert_model_ranges(context, "flat_earth", look).seeming == (("flat_earth", 15e3),)
+    assert convert_model_ranges(context, "ellipsoid", look) == look
+    assert not offer.is_envelope_used
     unknown: Any = SimpleNamespace(producers=[SimpleNamespace(offer=None)])
-    assert seeming_look(unknown, "flat_earth", look) == FarthestLook(math.inf)
+    assert convert_model_ranges(unknown, "flat_earth", look) == FarthestLook(math.inf)

@@ -5,7 +5,7 @@ import math
 import crooked
 from wired import chain, rows, run, sensor
 
-from components.line_of_sight.model_choice import angle_text, name_of, range_text
+from components.line_of_sight.model_choice import angle_text, model_label, range_text
 
 NEARLY_LEVEL = {**crooked.OWNSHIP, "pitch_deg": 0.3, "roll_deg": 0.2, "climb_mps": 0.0}
 RADAR = sensor(
@@ -55,5 +55,5 @@ def test_nothing_is_proven_of_ranges_behind_a_moving_target_filter():
 def test_errors_and_models_are_said_in_words():
     assert (range_text(5.2531), range_text(math.inf)) == ("5.3 m", "any size")
     assert angle_text(math.radians(0.00412)) == "0.0041 deg" and angle_text(math.pi) == "any size"
-    assert name_of("flat_earth") == "flat earth"
-    assert name_of("flat_earth", "first_order") == "flat earth with first-order attitude"
+    assert model_label("flat_earth") == "flat earth"
+    assert model_label("flat_earth", "first_order") == "flat earth with first-order attitude"

@@ -13,13 +13,13 @@ from lab import CONFIGS
 
 from dsa_des.errors import SceneError
 from dsa_des.replicas import lock_step_size, replicas
-from dsa_des.replicas.lock_step_size import RunSize, are_few
+from dsa_des.replicas.lock_step_size import RunSize, surely_fit_in_memory
 from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.results.folder import failure_counts_of_part
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies import attempts
-from dsa_des.studies.attempts import run_together
+from dsa_des.studies.attempts import group_chunks
 from dsa_des.studies.chunk import ChunkResult, run_chunk, run_chunks
 from dsa_des.studies.study import Chunk, Study
 from dsa_des.studies.study_file import study_of_tables
@@ -38,7 +38,7 @@ def study(per_chunk: int, runs: int = RUNS, **more: Any) -> Study:
 
 
 def run_all(one: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
-    return [done for some in run_together(one, chunks, 1) for done in run_chunks(one, some)]
+    return [done for some in group_chunks(one, chunks, 1) for done in run_chunks(one, some)]
 
 
 @pytest.fixture
@@ -78,7 +78,7 @@ def test_lock_steps_hold_what_memory_does_and_each_about_as_many(
     shared: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(lock_step_size, "FEW", 0)
-    monkeypatch.setattr(lock_step_size.RunSize, "most", 4)
+    monkeypatch.setattr(lock_step_size.RunSize, "largest_run_count", 4)
     whole = run_all(one := study(RUNS), list(one.chunks(0, [0])))
     assert shared == [4, 3, 3]
     del shared[:]
@@ -110,7 +110,7 @@ def test_a_run_holds_about_what_it_is_taken_for() -> None:
     finally:
         tracemalloc.stop()
     assert scene.duration_s == 180
-    assert peaks[1] - peaks[0] == pytest.approx(64 * RunSize.of(scene, {}).held, rel=0.4)
+    assert peaks[1] - peaks[0] == pytest.approx(64 * RunSize.estimate(scene, {}).held, rel=0.4)
 
 
 def test_a_lock_step_of_many_aircraft_holds_as_many_fewer_runs() -> None:
@@ -124,23 +124,25 @@ def test_a_lock_step_of_many_aircraft_holds_as_many_fewer_runs() -> None:
         load_scene(CONFIGS / "avoidance" / "crossing_tracked.toml", sets=some, duration_s="60")
         for some in ((), sets)
     )
-    two, nine = (RunSize.of(scene, {}) for scene in (few, crowd))
+    two, nine = (RunSize.estimate(scene, {}) for scene in (few, crowd))
     assert (nine.held, nine.recorded) == (4.5 * two.held, 0.0)
-    assert nine.most == int(360e6 / nine.held)
-    wide = RunSize.of(crowd, {"tracks": ("tick", "range_m")})
+    assert nine.largest_run_count == int(360e6 / nine.held)
+    wide = RunSize.estimate(crowd, {"tracks": ("tick", "range_m")})
     scans = wide.recorded / (8 * 2 * 8)
     assert scans == int(scans) > 60
-    told = RunSize.of(crowd, {"manoeuvres": ("tick", "turn_rad")})
+    told = RunSize.estimate(crowd, {"manoeuvres": ("tick", "turn_rad")})
     assert told.recorded == wide.recorded / 8  # a row for all of them
-    assert wide.most == nine.most and replace(wide, recorded=1e6).most == int(360e6 / 2.4e6)
-    assert are_few(crowd, 64) and not are_few(crowd, 65)
+    limited = replace(wide, recorded=1e6)
+    assert wide.largest_run_count == nine.largest_run_count
+    assert limited.largest_run_count == int(360e6 / 2.4e6)
+    assert surely_fit_in_memory(crowd, 64) and not surely_fit_in_memory(crowd, 65)
 
 
 def test_every_worker_has_about_as_much() -> None:
     one = study(1, 24)
     chunks = list(one.chunks(0, [0]))
     for workers in (1, 2, 3):
-        sizes = [len(some) for some in run_together(one, chunks, workers)]
+        sizes = [len(some) for some in group_chunks(one, chunks, workers)]
         assert sizes == [24 // workers] * workers
 
 
@@ -149,12 +151,12 @@ def test_cells_without_a_loop_and_single_chunks_are_run_as_they_are(
 ) -> None:
     two = study(4, 8, axes={"blocks.radar.scan_rate_hz": [1, 2]})
     chunks = list(two.chunks(0, [0, 1]))
-    assert [len(some) for some in run_together(two, chunks, 1)] == [2, 2]  # a cell each
+    assert [len(some) for some in group_chunks(two, chunks, 1)] == [2, 2]  # a cell each
     for broken in (lambda scene: set(), _refused):
-        monkeypatch.setattr(attempts, "edges_opening_loops", broken)
-        assert [len(some) for some in run_together(two, chunks, 1)] == [1] * 4
-    assert list(run_together(two, chunks[:1], 8)) == [(chunks[0],)]
-    assert list(run_together(two, [], 8)) == []
+        monkeypatch.setattr(attempts, "longest_delay_cut_edges", broken)
+        assert [len(some) for some in group_chunks(two, chunks, 1)] == [1] * 4
+    assert list(group_chunks(two, chunks[:1], 8)) == [(chunks[0],)]
+    assert list(group_chunks(two, [], 8)) == []
 
 
 def _refused(scene: Any) -> Any:

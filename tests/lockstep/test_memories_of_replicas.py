@@ -90,7 +90,7 @@ def test_a_track_is_named_by_where_the_targets_are_at_that_instant():
         np.array([[here, there], [there, here], [here, there]]),
     )  # fmt: skip
     now = RunTicks.of_run(0, np.array([10, 15, 20, 29, 30]))
-    named = tracks._nearest(now, np.full((5, 3), 10.0))
+    named = tracks._nearest_target(now, np.full((5, 3), 10.0))
     assert named.tolist() == [0, 0, 1, 1, 0]
 
 
@@ -101,8 +101,8 @@ def test_tracks_are_gone_by_the_time_of_their_own_run(times_s, left):
     """A run is at 0 s when another one is at 8 s, and a third has no scan at all."""
     memory = LevelMemory(MemoryRule(hysteresis_s=5.0, persistence_s=0.0, m=0, n=1))
     due = np.ones((3, 2), dtype=bool)
-    memory.levels(np.array([0, 1, 2]), np.full(3, 7), np.array([0.0, 8.0, 0.0]), due, due)
-    memory.forget(np.array([0, 1]), np.array(times_s))
+    memory.update_levels(np.array([0, 1, 2]), np.full(3, 7), np.array([0.0, 8.0, 0.0]), due, due)
+    memory.forget_absent(np.array([0, 1]), np.array(times_s))
     assert len(memory) == left
 
 

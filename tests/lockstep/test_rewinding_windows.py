@@ -8,7 +8,7 @@ from same_runs import tables_of
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
-from dsa_des.running.loops import cut_loops
+from dsa_des.running.loops import loop_cut_edges
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
@@ -92,10 +92,10 @@ def test_a_failure_that_happens_is_reported(monkeypatch):
 
 def test_loops_are_cut_where_an_input_can_be_done_without():
     scene = load_scene(SCENE)
-    assert cut_loops(scene.graph, scene.classes) == {("avoidance", "traffic")}
+    assert loop_cut_edges(scene.graph, scene.classes) == {("avoidance", "traffic")}
     open_loop = [wire for wire in scene.wires if wire.source != "avoidance"]
     graph = build_graph(list(scene.blocks), open_loop)
-    assert cut_loops(graph, scene.classes) == set()
+    assert loop_cut_edges(graph, scene.classes) == set()
 
 
 CUED = "configs/tracking/cueing.toml"

@@ -7,7 +7,7 @@ import pytest
 from same_runs import replicas_of, same_as_alone, tables_of
 
 from dsa_des.replicas.lockstep import NotInLockStep, make_lockstep_simulation
-from dsa_des.running.loops import edges_opening_loops
+from dsa_des.running.loops import longest_delay_cut_edges
 from dsa_des.scene.graph import build_graph
 from dsa_des.scene.scene import load_scene
 
@@ -60,7 +60,7 @@ def test_a_loop_is_opened_where_it_takes_longest():
             for wire in scene.wires
         ]
         graph = build_graph(list(scene.blocks), wires)
-        assert edges_opening_loops(replace(scene, wires=wires, graph=graph)) == {edge}
+        assert longest_delay_cut_edges(replace(scene, wires=wires, graph=graph)) == {edge}
 
 
 def test_a_loop_that_comes_back_at_once_is_left_to_runs_one_by_one():

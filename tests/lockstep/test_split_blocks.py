@@ -39,7 +39,7 @@ def test_a_split_block_is_no_block():
         assert node.component is simulation.components[name]
     assert simulation.nodes["fusion"].runner is simulation.timeline.split["fusion"]
     public = {name for name in dir(SplitBlock) if not name.startswith("_")}
-    assert public == {"run", "close"}
+    assert public == {"run", "close_instances"}
 
 
 @pytest.mark.parametrize("rates", [("0.1", "0.1"), ("1.5", "3")])

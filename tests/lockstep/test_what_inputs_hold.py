@@ -7,7 +7,7 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.message import Message
 from dsa_des.running.channel import Channel
 from dsa_des.running.windows import Windows
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 RUN_TICKS = 60
 
@@ -16,7 +16,7 @@ def as_held(runs, sent, asked, longest, horizon=None, *, initial=False):
     """Whether every replica holds at each tick that it asks about what came there last."""
     channel = Channel("source", 0, None, runs)
     if initial:
-        channel.hold(Message(np.array([-1])), -1)
+        channel.set_held_message(Message(np.array([-1])), -1)
         sent = [[-1, *ticks] for ticks in sent]
     windows = Windows(runs, longest, horizon)
     told = 0

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from components.metrics.losses import (
-    closest,
+    displacements_around,
+    find_closest_approach,
     first_losses_s,
     first_times_inside,
-    nearest_of,
-    ways_of,
+    nearest_ranges_and_times,
 )
-from components.metrics.separation import Separation, distances_m, separations
+from components.metrics.separation import Separation, distances_m, relative_flights
 from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Text
@@ -180,9 +180,9 @@ def test_flights_together_are_as_each_alone(small: Path) -> None:
     for k, (north_m, until_s) in enumerate([(5000, 60), (4321.5, 48.37), (900, 20), (-3000, 35)]):
         sets = (f"blocks.traffic.intruders[0].north_m={north_m}",)
         scene = load_scene("small.toml", sets=sets, duration_s=until_s)
-        flights += separations(scene, None if k < 3 else 0.5)
-    range_m, time_s = nearest_of(flights)
-    alone = [closest(flight)[:2] for flight in flights]
+        flights += relative_flights(scene, None if k < 3 else 0.5)
+    range_m, time_s = nearest_ranges_and_times(flights)
+    alone = [find_closest_approach(flight)[:2] for flight in flights]
     assert list(zip(range_m.tolist(), time_s.tolist(), strict=True)) == alone
     found = first_losses_s(flights, WELL_CLEAR_M, NMAC_M)
     for flight, (lost_s, _) in zip(flights[:3], found.tolist(), strict=False):
@@ -191,7 +191,7 @@ def test_flights_together_are_as_each_alone(small: Path) -> None:
         inside = (apart.horizontal_m < WELL_CLEAR_M[0]) & (apart.vertical_m < WELL_CLEAR_M[1])
         assert lost_s == pytest.approx(times[np.argmax(inside)], abs=2e-3)
     assert np.isnan(found[3]).all()
-    own, target = ways_of(flights, np.minimum(time_s, 10.0), 0.5)
+    own, target = displacements_around(flights, np.minimum(time_s, 10.0), 0.5)
     # North and east of an ownship that meets its targets; the last is looked at from time 0 on.
     wanted = np.array([[50, 50, 50, 25], [0, 0, 0, 0]])
     np.testing.assert_allclose(own, wanted, atol=0.01)
@@ -225,9 +225,13 @@ def test_distances_do_not_depend_on_the_pieces_they_come_in(
     scene = load_scene("small.toml", duration_s=60)
 
     def found() -> tuple[Any, ...]:
-        (flight,) = separations(scene, 0.13)
+        (flight,) = relative_flights(scene, 0.13)
         time_s = np.concatenate([piece.time_s for piece in flight.pieces()])
-        return time_s.tolist(), closest(flight), first_times_inside(flight, WELL_CLEAR_M, NMAC_M)
+        return (
+            time_s.tolist(),
+            find_closest_approach(flight),
+            first_times_inside(flight, WELL_CLEAR_M, NMAC_M),
+        )
 
     whole = found()
     assert len(whole[0]) > 1000  # the grid and the samples of the source

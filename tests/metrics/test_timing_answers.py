@@ -14,9 +14,9 @@ from components.metrics.track_quality import age_quantile_s, mean_age_s, mean_in
 from dsa_des.cli import main
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.chunk import run_chunk
-from dsa_des.studies.identity import record_of
 from dsa_des.studies.runner import tables_of
 from dsa_des.studies.study import Study
+from dsa_des.studies.study_digest import record_of
 from dsa_des.studies.study_file import read_study
 from dsa_des.time.clock import ClockSpec
 

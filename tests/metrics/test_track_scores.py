@@ -11,9 +11,9 @@ from scipy.stats import chi2
 from components.metrics.track_scores import (
     ReportedTracks,
     TrackTally,
-    changes,
+    count_breaks_and_swaps,
     innovation_results,
-    set_distance,
+    ospa_and_gospa,
 )
 from dsa_des.results.statistics import chi_square_bounds
 
@@ -39,13 +39,13 @@ def test_distances_of_sets_are_the_least_of_all_assignments(order):
     rng = np.random.default_rng(8)
     for tracks, truths in [(1, 1), (2, 3), (3, 2), (3, 3), (0, 2), (2, 0), (1, 4)]:
         distance = rng.uniform(0, 150, (tracks, truths))
-        found = set_distance(distance, 100.0, order)
+        found = ospa_and_gospa(distance, 100.0, order)
         ospa, gospa = enumerated(distance, 100.0, order)
         assert found.ospa_m == pytest.approx(ospa)
         assert found.gospa_m == pytest.approx(gospa)
         parts = found.localisation_m, found.missed_m, found.false_m
         assert sum(part**order for part in parts) == pytest.approx(gospa**order)
-    nothing = set_distance(np.empty((0, 0)), 100.0)
+    nothing = ospa_and_gospa(np.empty((0, 0)), 100.0)
     assert nothing.ospa_m == nothing.gospa_m == 0.0
 
 
@@ -57,13 +57,13 @@ def test_the_last_nees_of_a_stretch_is_that_of_its_end_and_not_of_its_start():
     tally = TrackTally(100.0, 2.0, 1.0)
     tally.paired_s, tally.nees = [5.0, 5.0, 9.0, 10.0, 10.0, 11.0], [1.0, 3.0, 7.0, 20.0, 30.0, 9.0]
     ends = [(0.0, 5.0), (5.0, 10.0), (5.0, 9.5), (10.0, 15.0), (11.0, 15.0)]
-    assert [tally.last_nees(*each) for each in ends[:4]] == [2.0, 25.0, 7.0, 9.0]
-    assert math.isnan(tally.last_nees(*ends[4]))
+    assert [tally.mean_nees_at_last_instant(*each) for each in ends[:4]] == [2.0, 25.0, 7.0, 9.0]
+    assert math.isnan(tally.mean_nees_at_last_instant(*ends[4]))
 
 
 def test_identities_break_and_swap():
-    assert changes({0: [1, 1, 3, 3], 1: [2, 2]}) == (1.0, 0.0)
-    assert changes({0: [1, 2, 2], 1: [2, 1, 1]}) == (0.0, 2.0)
+    assert count_breaks_and_swaps({0: [1, 1, 3, 3], 1: [2, 2]}) == (1.0, 0.0)
+    assert count_breaks_and_swaps({0: [1, 2, 2], 1: [2, 1, 1]}) == (0.0, 2.0)
 
 
 LIMIT = 100.0
@@ -280,7 +280,7 @@ def test_siap_and_ospa_are_those_of_stone_soup():
     for k, (numbered, places) in enumerate(steps):
         when = start + timedelta(seconds=k + 1)
         apart = np.array([[math.dist(a, b) for b in places.values()] for a in numbered.values()])
-        found = set_distance(apart.reshape(len(numbered), len(places)), LIMIT)
+        found = ospa_and_gospa(apart.reshape(len(numbered), len(places)), LIMIT)
         mine.append(found.ospa_m)
         assert found.ospa_m == pytest.approx(by_time[when])
         assert found.gospa_m == pytest.approx(parts[when]["distance"])

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from components.arguments.checks import LARGEST, angle, finite, squarable
+from components.arguments.checks import LARGEST, check_angle_rad, check_squarable, finite
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 bad = pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, "far", None, [1.0, np.nan]])
 
 
 @bad
-@pytest.mark.parametrize("check", [finite, squarable, angle])
+@pytest.mark.parametrize("check", [finite, check_squarable, check_angle_rad])
 def test_what_is_no_number_is_refused_by_name(check, value):
     with pytest.raises(ValueError, match=r"^range_m is "):
         check("range_m", value)
@@ -26,20 +26,20 @@ def test_finite_takes_any_size_as_it_is(value):
 @given(numbers)
 def test_squarable_takes_what_can_be_squared_and_refuses_the_rest(value):
     if abs(value) <= LARGEST:
-        assert float(squarable("x", value)) == value
-        assert np.isfinite(squarable("x", value) ** 2)
+        assert float(check_squarable("x", value)) == value
+        assert np.isfinite(check_squarable("x", value) ** 2)
     else:
         with pytest.raises(ValueError, match=r"x is .*1e\+150"):
-            squarable("x", value)
+            check_squarable("x", value)
 
 
 def test_squarable_says_which_element():
     with pytest.raises(ValueError, match=r"x is 1e\+200 \(element 1\)"):
-        squarable("x", [1.0, 1e200, 2.0])
+        check_squarable("x", [1.0, 1e200, 2.0])
 
 
 @given(numbers, numbers)
 def test_two_angles_can_be_added(one, other):
-    assert np.isfinite(angle("a", one) + angle("b", other))
+    assert np.isfinite(check_angle_rad("a", one) + check_angle_rad("b", other))
     if abs(one) <= 1e15:
-        assert float(angle("a", one)) == one
+        assert float(check_angle_rad("a", one)) == one

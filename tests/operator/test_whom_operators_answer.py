@@ -121,7 +121,7 @@ def test_ways_out_of_many_instants_are_those_of_each(tmp_path, monkeypatch):
     loop["wires"] = loop["wires"][:1]
     run(loop)
     _, configuration, alerter, alerts, _ = max(kept, key=lambda given: len(given[3]))
-    places = [n for n, level in enumerate(alerts.highest()) if level][:12]
+    places = [n for n, level in enumerate(alerts.highest_levels()) if level][:12]
     assert len(places) == 12
     for kind in ("alt", "hdir"):
         each = [changes_out_of_bands(kind, configuration, alerter, alerts, [n])[0] for n in places]

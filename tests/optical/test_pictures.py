@@ -12,7 +12,12 @@ from same_runs import same_as_alone, same_in_any_window
 
 import components.optical.image as image
 from components.optical.flow import find_spot, spot_flow
-from components.optical.picture import Pinhole, coverages, target_outlines, union_coverage
+from components.optical.picture import (
+    Pinhole,
+    polygon_pixel_shares,
+    target_outlines,
+    union_coverage,
+)
 from components.optical.silhouette import union_area
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
@@ -77,7 +82,7 @@ def test_a_pinhole_keeps_lines_straight_and_comes_back():
 
 def coverage(corners, rows, columns):
     picture = np.zeros((rows, columns))
-    ((box, share),) = coverages(corners[np.newaxis], rows, columns)
+    ((box, share),) = polygon_pixel_shares(corners[np.newaxis], rows, columns)
     picture[box] = share
     return picture
 

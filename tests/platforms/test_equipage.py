@@ -5,7 +5,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from components.examples import folder as examples
+from components.examples import configs_folder as examples
 from docs.make.platforms.equipage import rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml

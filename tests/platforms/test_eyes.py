@@ -8,10 +8,10 @@ from equipped import SURE_RADAR, TURN_AWAY, scene_of
 import dsa_des
 from components.cdti.scope import Scope
 from components.display.alerted import Alerted
-from components.display.outcomes import carried_blocks
-from components.display.picture import held_positions
+from components.display.outcomes import platform_by_block
+from components.display.picture_plane import held_positions
 from components.display.recorded_run import tables_of
-from components.display.symbols import in_colours, platform_colours, styles_of
+from components.display.symbols import platform_colours, recolour_by_platform, sensor_marks
 from components.view.run_picture import run_picture
 from dsa_des.embed import Simulator
 from dsa_des.errors import UsageError
@@ -73,11 +73,11 @@ def test_sensors_have_the_colour_of_what_carries_them(scene, folder):
     assert mine["colour"] != other["colour"] == alone["colour"]
     assert mine["range_m"] == other["range_m"] == alone["range_m"] == 9000.0
     simulation = Simulation(scene)
-    carrying = carried_blocks(simulation)
+    carrying = platform_by_block(simulation)
     assert list(platform_colours(carrying.values())) == ["ownship", "b"]
-    styles = styles_of(["radar", "radar_b"], simulation.components, carrying)
+    styles = sensor_marks(["radar", "radar_b"], simulation.components, carrying)
     assert [styles[name].colour for name in styles] == [mine["colour"], other["colour"]]
-    assert in_colours(styles, {}, platform_colours([])) == styles
+    assert recolour_by_platform(styles, {}, platform_colours([])) == styles
     told = Alerted.read(folder).manoeuvres
     assert {*told} == {"ownship", "b"} and all(len(times_s) == 1 for times_s in told.values())
 
@@ -86,7 +86,7 @@ def test_a_display_is_that_of_one_platform(scene):
     recorder = Recorder([MemorySink()])
     simulation = Simulation(scene, recorder=recorder)
     scopes = {on: Scope(simulation, on) for on in (None, "ownship", "b")}
-    recorder.listeners += [scope.listen for scope in scopes.values()]
+    recorder.listeners += [scope.store_message for scope in scopes.values()]
     simulation.run()
     shown = {on: scope.picture(8.0) for on, scope in scopes.items()}
     assert shown[None] == shown["ownship"]
@@ -142,7 +142,7 @@ def test_tracks_go_out_to_other_programs_from_where_they_were_measured(own):
         del tables["blocks"][name]
     tables["wires"] = [w for w in tables["wires"] if not any(name in str(w) for name in blocks)]
     run = tables_of(dsa_des.run(dsa_des.load_scene(tables)))
-    assert run.own_name == "zulu" and next(iter(run.flights())) == "zulu"
+    assert run.own_name == "zulu" and next(iter(run.true_flights())) == "zulu"
     rows, places = held_positions(run)
     about = np.array([run.texts("tracks", name) for name in ("block", "target")])[:, rows].T
     seen = {"tracker": {"bravo"}, "tracker_b": {"zulu"}, "tracker_s": {"zulu", "bravo"}}
@@ -152,7 +152,7 @@ def test_tracks_go_out_to_other_programs_from_where_they_were_measured(own):
     for (_, target), when_s, place in zip(
         about.tolist(), run.numbers("tracks", "measured_s")[rows], places.T, strict=True
     ):
-        flown = run.flights()[target]
+        flown = run.true_flights()[target]
         at = int(np.flatnonzero(flown["time_s"] == when_s)[0])
         true = [flown[name][at] for name in ("lat_deg", "lon_deg", "alt_m")]
         apart = np.subtract(pymap3d.geodetic2ecef(*place), pymap3d.geodetic2ecef(*true))

@@ -116,7 +116,7 @@ def test_a_track_after_the_link_is_as_sure_as_the_closed_form():
     ):  # fmt: skip
         others = OthersTracks(frozenset(), probability, ConstantVelocity(q), noise)
         moved = state + np.array([shift, 0, 0, 0, 0, 0])
-        found, deviations = others.judge_tracks(
+        found, deviations = others.own_tracks_and_deviations(
             one_track(moved, p), np.array([tau]), own, velocity[:, np.newaxis], np.zeros(1, int)
         )
         assert found.tolist() == [is_own]
@@ -134,7 +134,7 @@ def test_of_two_at_ones_own_place_the_nearer_is_oneself():
     )
     others = OthersTracks(frozenset(), 0.9999, ConstantVelocity(4.0), (0.0, 0.0, 0.0))
     both = np.stack([velocity] * 2, axis=1)
-    found, _ = others.judge_tracks(tracks, np.zeros(2), own, both, np.zeros(2, int))
+    found, _ = others.own_tracks_and_deviations(tracks, np.zeros(2), own, both, np.zeros(2, int))
     assert found.tolist() == [False, True]
 
 

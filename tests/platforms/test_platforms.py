@@ -221,7 +221,7 @@ def test_a_recorded_aircraft_that_is_steered_has_its_closest_approach_where_the_
     simulation, recorded = tables_of(dsa_des.load_scene(tables))
     assert len(recorded["manoeuvres"]) == 1
     found = simulation.components["traffic"].report()["targets"]["INTRUDER"]["closest_approach"]
-    from_there = simulation.components["traffic"].approaches("INTRUDER")
+    from_there = simulation.components["traffic"].closest_approaches("INTRUDER")
     assert from_there == {"ownship": {"closest_approach": pytest.approx(found, abs=1e-6)}}
     ends = [recorded["truth"].filter(pc.equal(pc.fill_null(recorded["truth"]["target"], ""), name))
             for name in ("", "INTRUDER")]  # fmt: skip

@@ -58,9 +58,9 @@ def test_tracks_are_held_against_what_their_platform_sees_as_it_flew(run):
 def test_the_terminal_has_a_block_for_each(run, capsys):
     from rich.console import Console
 
-    from components.display.terminal import show
+    from components.display.terminal import print_run_summary
 
-    show(Console(width=120), run.summary)
+    print_run_summary(Console(width=120), run.summary)
     own, theirs = capsys.readouterr().out.split("On board of b")
     assert "On board of ownship" in own
     for text, name, other in ((own, "tracker", "b"), (theirs, "tracker_b", "ownship")):
@@ -73,10 +73,10 @@ def test_a_field_of_view_is_drawn_where_its_platform_starts():
     simulation = Simulation(dsa_des.load_scene("one_is_blind"))
     simulation.run()
     flights = Flights.from_simulation(simulation, {})
-    yaw_rad, start_km = flights.start_of("other")
+    yaw_rad, start_km = flights.start_yaw_and_position("other")
     assert np.degrees(yaw_rad) % 360.0 == pytest.approx(270.0, abs=0.1)
     assert start_km == pytest.approx((6.2, 6.0), abs=0.01)
-    assert flights.start_of("ownship") == (pytest.approx(0.0), (0.0, 0.0))
+    assert flights.start_yaw_and_position("ownship") == (pytest.approx(0.0), (0.0, 0.0))
     radar = simulation.components["radar_b"]
     corners = outline_of(yaw_rad, radar.stated_reach, radar.axes, start_km).corners_km
     angle = np.radians([260.0, 280.0])

@@ -188,10 +188,10 @@ def test_rows_keep_the_flights_they_know() -> None:
     def northward(own: Any, other: Any) -> Any:
         return {"north_deg": other.lat_deg - own.lat_deg, "of": {"target": other.lon_deg}}
 
-    halves = [joined.take_rows(rows).seen_by(northward) for rows in (slice(0, 4), slice(4, 7))]
+    halves = [joined.take_rows(rows).view_through(northward) for rows in (slice(0, 4), slice(4, 7))]
     seen = KnownFlights.join_rows(halves)
     assert (seen(columns, time_s)["north_deg"] == time_s - north[:, np.newaxis]).all()
     row, ahead_s = np.array([5, 0, 6]), np.array([0.5, 0.25, 0.0])
-    each = seen.each(row, np.array([8, 5, 8]), time_s[row, 0], ahead_s)
+    each = seen.columns_of_single_targets(row, np.array([8, 5, 8]), time_s[row, 0], ahead_s)
     assert (each["north_deg"] == time_s[row, 0] + ahead_s - north[row]).all()
     assert each["of_target"].tolist() == [8, 5, 8]

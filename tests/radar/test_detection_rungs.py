@@ -137,6 +137,6 @@ def test_albersheim_refuses(change, message):
 )  # fmt: skip
 def test_a_boundary_lies_where_the_calibration_knows_it_else_at_the_limit(block, keys):
     (rung,) = (rung for rung in DETECTION.rungs if rung.name == "range_boundary")
-    assert rung.changes(block) == keys
+    assert rung.parameters_to_set(block) == keys
     with pytest.raises(Unavailable, match=r"needs calibrate\.range_km or range_km"):
-        rung.changes({"type": "radar.threshold"})
+        rung.parameters_to_set({"type": "radar.threshold"})

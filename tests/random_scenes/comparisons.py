@@ -83,7 +83,7 @@ def recorded(
     sink = ColumnSink()
     simulation = Simulation(scene, recorder=Recorder([sink]), **options)
     if longest_ticks is not None:
-        simulation.windows.limit(longest_ticks)
+        simulation.windows.limit_length(longest_ticks)
     outcome = simulation.run()
     return {**plain(sink.tables()), "(report)": flat(outcome.report)}
 

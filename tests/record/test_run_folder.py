@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 import dsa_des
 from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_files
-from dsa_des.record.drawing import _make_plain
+from dsa_des.record.drawing import _shorten_and_escape_texts
 from dsa_des.record.run_folder import _matching_rows, read_run, write_json, write_run_json
 
 
@@ -23,7 +23,7 @@ def fill(folder, rows=3):
 
 def test_a_run_reads_back(tmp_path):
     target = tmp_path / "run"
-    with OutputFolder(target).writing() as folder:
+    with OutputFolder(target).write_then_rename() as folder:
         fill(folder)
     run = read_run(target)
     files = run.info.pop("files")
@@ -71,7 +71,7 @@ def test_reading_what_is_no_run(tmp_path):
 
 def test_a_folder_name_is_not_taken_for_a_partition(tmp_path):
     target = tmp_path / "seed=3"
-    with OutputFolder(target).writing() as folder:
+    with OutputFolder(target).write_then_rename() as folder:
         fill(folder)
     assert read_run(target)["scans"].column_names == ["x"]
 
@@ -133,7 +133,7 @@ def test_long_and_hostile_words_are_cut_wherever_they_stand_in_a_figure():
     axes.set_xlabel("two\nlines")
     axes.set_ylabel("plain")
     axes.text(0.5, 0.5, "\n".join("many"))
-    _make_plain(figure)
+    _shorten_and_escape_texts(figure)
     shown = axes.get_title()
     assert len(shown) <= 200 + len(r"\x1b") and "\x1b" not in shown and "$x" not in shown[:100]
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("two\nlines", "plain")

@@ -16,7 +16,7 @@ from components.fusion.pick_best import closest_clock_distance_s
 from components.guidance.mvp import VoltagePotential
 from components.messages.reach import FarthestLook
 from components.surveillance.exchange import PositionExchange
-from dsa_des.arrays.run_ticks import runs_of_single
+from dsa_des.arrays.run_ticks import single_run_numbers
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.record.failure_counts import Tries, add_counts
 from dsa_des.replicas.lockstep import make_lockstep_simulation
@@ -311,7 +311,7 @@ def test_tries_of_runs_add_up_whatever_comes_when() -> None:
     ]
     assert tries.failure_counts("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
     assert Tries().failure_counts("x")["x"].shape == (2, 0)
-    alone = Tries().add_tries(runs_of_single(1), np.array([1]), np.array([True]))
+    alone = Tries().add_tries(single_run_numbers(1), np.array([1]), np.array([True]))
     for _ in range(2):  # a second source comes later, and it is done no more
-        alone = alone.add_tries(runs_of_single(2), np.array([1, 2]), np.zeros(2, dtype=bool))
+        alone = alone.add_tries(single_run_numbers(2), np.array([1, 2]), np.zeros(2, dtype=bool))
     assert alone.failure_counts("x", of_two=True)["x"].tolist() == [[0], [1]]

@@ -15,8 +15,8 @@ from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.splitting import FlownRuns, choose_parents, find_levels, run_repetitions
-from dsa_des.results.statistics import estimate_rare_mean
+from dsa_des.replicas.splitting import FlownRuns, find_levels, resample_parents, run_repetitions
+from dsa_des.results.statistics import estimate_rare_probability
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.study_file import read_study
 from dsa_des.time.randomness import Streams
@@ -72,7 +72,10 @@ def test_a_rare_probability_is_found_without_bias():
 
 
 def test_intervals_cover():
-    found = [estimate_rare_mean(some, np.zeros(10), 0.95) for some in of_many(2000).reshape(-1, 10)]
+    found = [
+        estimate_rare_probability(some, np.zeros(10), 0.95)
+        for some in of_many(2000).reshape(-1, 10)
+    ]
     covered = [one.low <= RARE <= one.high for one in found]
     # Three standard errors of a binomial share of so many intervals.
     assert abs(np.mean(covered) - 0.95) <= 3.0 * math.sqrt(0.95 * 0.05 / len(found))
@@ -129,15 +132,15 @@ def test_a_collapsed_repetition_is_none_that_is_dropped():
 
 def test_the_interval_where_no_repetition_came_to_it():
     """3.69 events are seen at least once with 97.5 %: so many times what one would have added."""
-    nothing = estimate_rare_mean(np.zeros(10), np.full(10, 2e-6), 0.95)
+    nothing = estimate_rare_probability(np.zeros(10), np.full(10, 2e-6), 0.95)
     assert (nothing.value, nothing.low) == (0.0, 0.0)
     assert nothing.high == pytest.approx(-math.log(0.025) * 2e-6 / 10)
-    assert estimate_rare_mean(np.zeros(10), np.full(10, 5.0), 0.95).high == 1.0
+    assert estimate_rare_probability(np.zeros(10), np.full(10, 5.0), 0.95).high == 1.0
 
 
 def test_the_interval_of_a_skewed_mean_is_that_of_its_logarithm():
     values = np.array([1e-6, 2e-6, 4e-6])
-    found = estimate_rare_mean(values, np.zeros(3), 0.95)
+    found = estimate_rare_probability(values, np.zeros(3), 0.95)
     half = 4.302652729911275 * values.std(ddof=1) / math.sqrt(3) / values.mean()
     np.testing.assert_allclose([found.low, found.high], values.mean() * np.exp([-half, half]))
 
@@ -169,7 +172,7 @@ def test_branches_come_from_each_run_as_often_as_it_weighs():
     weights = np.array([1.0, 2.0, 5.0, 2.0])
     often = np.zeros(4)
     for k in range(1000):
-        chosen = np.bincount(choose_parents(weights, 7, (k + 0.5) / 1000), minlength=4)
+        chosen = np.bincount(resample_parents(weights, 7, (k + 0.5) / 1000), minlength=4)
         assert (np.abs(chosen - 0.7 * weights) < 1.0).all()
         often += chosen
     np.testing.assert_allclose(often / 1000, 0.7 * weights, rtol=2e-3)
@@ -222,7 +225,7 @@ def test_a_probability_of_half_a_millionth_in_a_closed_loop(tmp_path):
     levels = [*range(26, 7, -2)]
     table = {"event": "nmac", "runs": 40, "levels": levels}
     rows = rows_of(study_of(tmp_path, splitting=table, replicas=12))
-    found = estimate_rare_mean(
+    found = estimate_rare_probability(
         *(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95
     )
     assert found.low < 0.5**21 < found.high
@@ -233,7 +236,7 @@ def test_distances_part_runs_that_may_still_turn(tmp_path):
     """Where a third of the runs come near without a turn they find what the closed form says."""
     table = {"event": "nmac", "score": "separation", "runs": 60, "levels": [10]}
     rows = rows_of(study_of(tmp_path, 0.93, splitting=table, replicas=8))
-    found = estimate_rare_mean(
+    found = estimate_rare_probability(
         *(np.array([row[n] for row in rows]) for n in ("nmac", "nmac.unseen")), 0.95
     )
     assert found.low < 0.93**21 < found.high < 2.0 * found.low

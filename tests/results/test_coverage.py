@@ -7,7 +7,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from dsa_des.results.differences import estimate_difference, paired_units
+from dsa_des.results.differences import estimate_difference, paired_unit_means
 from dsa_des.results.record import EVENT, NUMBER, SHARE, TRIALS, Result
 from dsa_des.results.statistics import Estimate, estimate_mean, estimate_share
 from dsa_des.results.summary import compare_axis, summarise
@@ -273,7 +273,7 @@ def test_runs_are_paired_before_encounters_are_averaged() -> None:
     # there is compared with nothing.
     first = np.array([1.0, np.nan, 4.0, 5.0, np.nan, 3.0])
     second = np.array([2.0, 90.0, 6.0, 7.0, 8.0, np.nan])
-    units, one, two = paired_units(np.array([5, 5, 7, 7, 8, 9]), first, second)
+    units, one, two = paired_unit_means(np.array([5, 5, 7, 7, 8, 9]), first, second)
     assert units.tolist() == [5, 7, 8, 9]
     assert one.tolist()[:2] == [1.0, 4.5] and two.tolist()[:2] == [2.0, 6.5]
     assert math.isnan(one[2]) and two[2] == 8.0

@@ -10,10 +10,10 @@ import pytest
 from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
-from dsa_des.files.output_names import claim_folder
-from dsa_des.results.figures import safe_name
+from dsa_des.files.output_names import make_numbered_folder
+from dsa_des.results.figures import safe_file_name
 from dsa_des.results.folder import StudyFolder, latest_folder
-from dsa_des.studies.identity import description_text
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 
 STUDY = """
@@ -130,7 +130,7 @@ def test_folders_behind_links_are_refused(ready: Path) -> None:
     assert "something other than a study" in error
     Path("new/run-cell-0-replica-0").unlink()
     folder = StudyFolder(Path("new"))
-    folder.open(description_text(read_study("study.toml")), resume=False)
+    folder.open(study_json_text(read_study("study.toml")), resume=False)
     folder.close()
     Path("new/run-cell-0-replica-0").symlink_to(outside)
     error = dsa_des(*words[:5], "new", "--quiet", "--resume", code=2).stderr
@@ -226,7 +226,7 @@ def test_a_malformed_study_json_is_one_error(ready: Path, name: str) -> None:
 def test_temporary_files_of_a_running_study_are_left_alone(ready: Path) -> None:
     study = read_study("study.toml")
     running = StudyFolder(Path("o"))
-    running.open(description_text(study), resume=True)
+    running.open(study_json_text(study), resume=True)
     left = Path("o/parts/.part-000-000000.parquet.7.0")
     left.write_bytes(b"half")
     words = ("study", "study.toml", "--workers", "1", "--out", "o", "--quiet", "--resume")
@@ -238,10 +238,10 @@ def test_temporary_files_of_a_running_study_are_left_alone(ready: Path) -> None:
 
 
 def test_two_studies_at_once_have_two_folders(ready: Path) -> None:
-    assert claim_folder(Path("studies"), "x") == Path("studies/x-001")
-    assert claim_folder(Path("studies"), "x") == Path("studies/x-002")
+    assert make_numbered_folder(Path("studies"), "x") == Path("studies/x-001")
+    assert make_numbered_folder(Path("studies"), "x") == Path("studies/x-002")
     Path("studies/x-003").symlink_to("nowhere")
-    assert claim_folder(Path("studies"), "x") == Path("studies/x-004")
+    assert make_numbered_folder(Path("studies"), "x") == Path("studies/x-004")
     for name in ("x-1000", "x-y-2000", "x-"):
         Path("studies", name).mkdir()
     assert latest_folder(Path("studies"), "x") == Path("studies/x-1000")
@@ -254,6 +254,6 @@ def test_two_studies_at_once_have_two_folders(ready: Path) -> None:
 
 
 def test_names_of_figures_stay_in_the_folder() -> None:
-    assert "/" not in safe_name("../../etc/passwd") and safe_name("a-b_c.d") == "a-b_c.d"
-    long = [safe_name("x" * 5000 + end) for end in "ab"] + [safe_name("ü" * 300)]
+    assert "/" not in safe_file_name("../../etc/passwd") and safe_file_name("a-b_c.d") == "a-b_c.d"
+    long = [safe_file_name("x" * 5000 + end) for end in "ab"] + [safe_file_name("ü" * 300)]
     assert all(len(name.encode()) <= 200 for name in long) and long[0] != long[1]

@@ -14,7 +14,7 @@ from dsa_des.results.labels import (
     unit_of,
     value_label,
 )
-from dsa_des.results.printing import round_estimate
+from dsa_des.results.printing import rounded_value_and_interval
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.report import _summary_cells
 from dsa_des.results.summary import Line
@@ -91,9 +91,9 @@ def test_few_values_are_marked() -> None:
 def test_values_are_rounded_to_what_is_known(
     value: float, low: float, high: float, shown: tuple[str, str]
 ) -> None:
-    assert round_estimate(statistics.Estimate(value, low, high, 20, False)) == shown
+    assert rounded_value_and_interval(statistics.Estimate(value, low, high, 20, False)) == shown
     starred = (shown[0], f"{shown[1]} *" if shown[1] else "")
-    assert round_estimate(statistics.Estimate(value, low, high, 3, True)) == starred
+    assert rounded_value_and_interval(statistics.Estimate(value, low, high, 3, True)) == starred
 
 
 @pytest.mark.parametrize(

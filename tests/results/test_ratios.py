@@ -8,7 +8,7 @@ import pyarrow as pa
 import pytest
 
 from components.metrics.risk import risk_ratios_by_class
-from dsa_des.results.printing import gain_text
+from dsa_des.results.printing import sampling_gain_text
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio
 from dsa_des.results.record import CLASS, EVENT, NUMBER, RATIO, RatioOf, Result
 from dsa_des.results.rows import Rows
@@ -241,6 +241,8 @@ def test_what_a_choice_of_runs_gained_is_said_in_a_sentence(gain, reason, events
         flown=1200, encounters=34_000, gain=gain, reason=reason, mitigated_events=events
     )
     line = SimpleNamespace(ratio=ratio, at=[2.5, "ekf"], result=SimpleNamespace(name="risk"))
-    assert gain_text(line) == f"2.5: ekf: risk: 1,200 of 34,000 runs were flown{more}"
+    assert sampling_gain_text(line) == f"2.5: ekf: risk: 1,200 of 34,000 runs were flown{more}"
     ratio.flown = 34_000
-    assert gain_text(line) == "2.5: ekf: risk: all 34,000 runs were flown: nothing is gained"
+    assert (
+        sampling_gain_text(line) == "2.5: ekf: risk: all 34,000 runs were flown: nothing is gained"
+    )

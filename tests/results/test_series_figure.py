@@ -13,13 +13,16 @@ from dsa_des.results import curves
 from dsa_des.results.curves import draw_series
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
-from dsa_des.results.summary import Line, results_of_series
+from dsa_des.results.summary import Line, result_numbers_of_series
 from dsa_des.results.tables import Tables
 
 
 def test_a_series_is_what_bears_a_number_in_its_order():
     names = ["a.t.10", "a.t.9", "a.t.x", "b.t.1", "a.t", "a.tt.3"]
-    assert list(results_of_series("a.t", names).items()) == [("a.t.9", 9.0), ("a.t.10", 10.0)]
+    assert list(result_numbers_of_series("a.t", names).items()) == [
+        ("a.t.9", 9.0),
+        ("a.t.10", 10.0),
+    ]
 
 
 class Axes:
@@ -36,7 +39,7 @@ def test_bounds_are_those_of_the_mean_of_as_many_runs():
     """Of one run and of 60: quantiles of chi-square with 6 and with 360 degrees."""
     lines = [Line((), None, Estimate(6.0, 5.0, 7.0, n, False), 0, None) for n in (1, 60, 0)]
     axes = Axes()
-    curves._draw_bounds(axes, [1.0, 2.0, 3.0], lines, 6.0, 0.95)
+    curves._draw_chi_square_bounds(axes, [1.0, 2.0, 3.0], lines, 6.0, 0.95)
     for k, n in enumerate((1, 60)):
         np.testing.assert_allclose([axes.low[k], axes.high[k]], chi2.ppf([0.025, 0.975], 6 * n) / n)
     assert np.isnan(axes.low[2]) and axes.middle == 6.0

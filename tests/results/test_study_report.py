@@ -11,7 +11,7 @@ from click.testing import CliRunner, Result
 
 from dsa_des.cli import main
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.report import PAGE_HEAD, page_environment
+from dsa_des.results.report import PAGE_HEAD, report_jinja_environment
 
 ROOT = Path(__file__).parents[2]
 STUDY = """\
@@ -210,7 +210,7 @@ def test_errors_of_models_are_measured_on_request_only(tmp_path: Path) -> None:
 
 
 def test_columns_in_which_nothing_stands_are_left_out():
-    page = page_environment().from_string(PAGE_HEAD + "{{ table(heads, rows) }}").render(
+    page = report_jinja_environment().from_string(PAGE_HEAD + "{{ table(heads, rows) }}").render(
         title="t", heads=("a", "b", "", "d"), rows=[("1", "", "x", ""), ("2", "", "", "")]
     )  # fmt: skip
     assert page.count("<th") == 1 and "<td></td></tr>" in page and ">b<" not in page

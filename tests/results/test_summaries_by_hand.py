@@ -9,9 +9,9 @@ from scipy import stats
 
 from dsa_des.commands.what_changed import ConditionPair, print_changes
 from dsa_des.costs.replay import median_and_spread
-from dsa_des.results.differences import _estimate_by_shares, estimate_difference
+from dsa_des.results.differences import _agresti_caffo_difference, estimate_difference
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
-from dsa_des.results.statistics import estimate_rare_mean
+from dsa_des.results.statistics import estimate_rare_probability
 from dsa_des.results.summary import compare_axis, summarise
 from tests.results.conftest import rows_of_table
 
@@ -111,26 +111,26 @@ def test_medians_and_half_the_quartiles_distance() -> None:
 def test_the_mean_of_rare_probabilities_by_hand() -> None:
     """Student's t of one degree is 12.706; half of it times the distance is the half-width."""
     nan, some = float("nan"), np.array([1e-4, float("nan"), 3e-4])
-    found = estimate_rare_mean(some, np.full(3, 1e-3), 0.95)
+    found = estimate_rare_probability(some, np.full(3, 1e-3), 0.95)
     factor = np.exp(12.7062 * 1e-4 / 2e-4)
     assert (found.value, found.count) == (pytest.approx(2e-4), 2)
     assert found.low == pytest.approx(2e-4 / factor, rel=1e-4)
     assert found.high == pytest.approx(2e-4 * factor, rel=1e-4)
     # Ten of 1 ± s are as sure as ten events where s is 1, for s / sqrt(10) = 1 / sqrt(10).
     for size, few in ((0.94, False), (0.96, True)):
-        ten = estimate_rare_mean(1.0 + size * np.tile([-1.0, 1.0], 5), np.ones(10), 0.95)
+        ten = estimate_rare_probability(1.0 + size * np.tile([-1.0, 1.0], 5), np.ones(10), 0.95)
         assert ten.few == few
-    alone = estimate_rare_mean(np.array([1e-4, nan]), np.full(2, 1e-3), 0.95)
+    alone = estimate_rare_probability(np.array([1e-4, nan]), np.full(2, 1e-3), 0.95)
     assert alone.value == 1e-4 and np.isnan([alone.low, alone.high]).all()
     # None was seen in two: 3.689 events are as rare as an end may err; each adds 0.002 to one.
-    none = estimate_rare_mean(np.zeros(2), np.array([1e-3, 3e-3]), 0.95)
+    none = estimate_rare_probability(np.zeros(2), np.array([1e-3, 3e-3]), 0.95)
     assert (none.value, none.low) == (0.0, 0.0)
     assert none.high == pytest.approx(-np.log(0.025) * 2e-3 / 2)
 
 
 def test_shares_are_told_apart_as_if_one_more_had_been_counted_of_either_kind() -> None:
     """Of 4 runs 1 and 4: 2 of 6 and 5 of 6, whose variances are 2/9 and 5/36, over 6 each."""
-    found = _estimate_by_shares(np.array([0.0, 1.0, 0.0, 0.0]), np.ones(4), 0.95)
+    found = _agresti_caffo_difference(np.array([0.0, 1.0, 0.0, 0.0]), np.ones(4), 0.95)
     half = 1.959964 * np.sqrt((2.0 / 9.0 + 5.0 / 36.0) / 6.0)
     assert (found.value, found.count, found.few) == (0.75, 4, True)
     assert (found.low, found.high) == pytest.approx((0.5 - half, 0.5 + half), rel=1e-6)

@@ -5,7 +5,7 @@ import threading
 
 import pytest
 
-from dsa_des.terminal.interruption import Terminated, defer_signals, plain_ending
+from dsa_des.terminal.interruption import Terminated, defer_signals, exit_plainly_on_signal
 
 ENDS = [(signal.SIGINT, 130, "interrupted"), (signal.SIGTERM, 143, "terminated")]
 
@@ -26,7 +26,7 @@ def _usual_handlers():
 @pytest.mark.parametrize(("number", "code", "word"), ENDS)
 def test_a_signal_is_one_line_and_an_exit_code(number, code, word, capsys):
     cleared = []
-    with pytest.raises(SystemExit) as ended, plain_ending():
+    with pytest.raises(SystemExit) as ended, exit_plainly_on_signal():
         try:
             signal.raise_signal(number)
         finally:
@@ -38,7 +38,7 @@ def test_a_signal_is_one_line_and_an_exit_code(number, code, word, capsys):
 @pytest.mark.parametrize(("number", "code", "word"), ENDS)
 @pytest.mark.parametrize("then", [ImportError("half"), SystemExit(2), SystemExit(0), None])
 def test_whatever_comes_of_a_signal_counts_as_it(number, code, word, then, capsys):
-    with pytest.raises(SystemExit) as ended, plain_ending():
+    with pytest.raises(SystemExit) as ended, exit_plainly_on_signal():
         try:
             signal.raise_signal(number)
         except KeyboardInterrupt:
@@ -48,7 +48,7 @@ def test_whatever_comes_of_a_signal_counts_as_it(number, code, word, then, capsy
 
 
 def test_who_has_said_it_already_is_not_repeated(capsys):
-    with pytest.raises(SystemExit) as ended, plain_ending():
+    with pytest.raises(SystemExit) as ended, exit_plainly_on_signal():
         try:
             signal.raise_signal(signal.SIGTERM)
         except KeyboardInterrupt:
@@ -58,25 +58,25 @@ def test_who_has_said_it_already_is_not_repeated(capsys):
 
 
 def test_one_inside_the_other_says_it_once(capsys):
-    with pytest.raises(SystemExit) as ended, plain_ending(), plain_ending():
+    with pytest.raises(SystemExit) as ended, exit_plainly_on_signal(), exit_plainly_on_signal():
         signal.raise_signal(signal.SIGTERM)
     assert ended.value.code == 143
     assert capsys.readouterr().err == "stopped: terminated\n"
 
 
 def test_other_ends_stay_as_they_are():
-    with plain_ending():
+    with exit_plainly_on_signal():
         pass
-    with pytest.raises(SystemExit) as ended, plain_ending():
+    with pytest.raises(SystemExit) as ended, exit_plainly_on_signal():
         raise SystemExit(2)
     assert ended.value.code == 2
-    with pytest.raises(ValueError, match="mine"), plain_ending():
+    with pytest.raises(ValueError, match="mine"), exit_plainly_on_signal():
         raise ValueError("mine")
 
 
 def test_ignored_signals_stay_ignored(capsys):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with plain_ending(), defer_signals():
+    with exit_plainly_on_signal(), defer_signals():
         signal.raise_signal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     assert capsys.readouterr().err == ""
@@ -85,7 +85,7 @@ def test_ignored_signals_stay_ignored(capsys):
 @pytest.mark.parametrize(("number", "code", "word"), ENDS)
 def test_a_step_that_must_not_be_halved_is_finished_first(number, code, word):
     done = []
-    with pytest.raises(SystemExit) as ended, plain_ending():
+    with pytest.raises(SystemExit) as ended, exit_plainly_on_signal():
         with defer_signals(), defer_signals():
             signal.raise_signal(number)
             signal.raise_signal(number)
@@ -103,7 +103,7 @@ def test_a_thread_that_is_not_the_main_one_is_left_alone():
     passed = []
 
     def work():
-        with plain_ending(), defer_signals():
+        with exit_plainly_on_signal(), defer_signals():
             passed.append(True)
 
     thread = threading.Thread(target=work)

@@ -15,7 +15,7 @@ from dsa_des.running.simulation import Simulation
 from dsa_des.running.timeline import Timeline
 from dsa_des.running.windows import Rewinder, Window, Windows
 from dsa_des.scene.scene import load_scene
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 from tests.running.window_cost import window_cost_s
 
 LOOP = "configs/benchmark/manoeuvres.toml"
@@ -36,7 +36,7 @@ def all_of(windows):
 def test_equal_windows_cover_a_run_once(longest, expected):
     assert all_of(Windows(Runs(1, 10), longest)) == expected
     windows = Windows(Runs(1, 10), longest)
-    windows.limit(0)  # no window is shorter than a tick
+    windows.limit_length(0)  # no window is shorter than a tick
     assert all_of(windows) == [(k, k + 1) for k in range(10)]
 
 
@@ -76,10 +76,10 @@ def test_windows_of_runs_together_come_back_to_each_of_them():
 
 def test_rows_are_final_up_to_where_all_runs_have_come():
     runs = Runs(9, 10)
-    assert runs.final_before(7, range(2, 5)) == (2, 0)
-    assert runs.final_before(10, range(2, 5)) == (5, 0)
-    assert runs.final_before(7, range(2, 3)) == (2, 7)
-    assert Runs(1, 10).final_before(7, range(1)) == (0, 7)
+    assert runs.rows_complete_before(7, range(2, 5)) == (2, 0)
+    assert runs.rows_complete_before(10, range(2, 5)) == (5, 0)
+    assert runs.rows_complete_before(7, range(2, 3)) == (2, 7)
+    assert Runs(1, 10).rows_complete_before(7, range(1)) == (0, 7)
 
 
 def a_loop(lab, end, back):
@@ -144,7 +144,7 @@ class WilfulWindows:
         self.inner.limit(longest_ticks)
 
     def next(self):
-        self.inner.limit(self.dice.randrange(10**9, 20 * 10**9))
+        self.inner.limit_length(self.dice.randrange(10**9, 20 * 10**9))
         return self.inner.next()
 
     def commit(self, window, failure):
@@ -204,7 +204,7 @@ def test_a_pacer_waits_for_what_is_final_only():
 def test_a_pacer_that_was_stopped_ends_the_run():
     pacer = Pacer(1e6)
     simulation = Simulation(load_scene("configs/first_light.toml", duration_s="3"))
-    simulation.windows.limit(simulation.ticks_per_s)
+    simulation.windows.limit_length(simulation.ticks_per_s)
 
     def stop(time_s):
         pacer.stopped = time_s >= 2.0
@@ -216,7 +216,7 @@ def test_a_pacer_that_was_stopped_ends_the_run():
 def test_an_end_found_in_a_window_that_is_undone_was_never_found():
     runs = Runs(1, 100)
     rewinder = Rewinder([], set(), None, runs)
-    rewinder.mark()
+    rewinder.save_state()
     runs.note_ends(RunTicks.of_run(0, np.array([40])), "over")
     assert runs.early and runs.ended_by == {0: "over"}
     rewinder.restore()

@@ -9,7 +9,7 @@ from test_false_alarms_look_like_targets import CROWD, noisy
 from wired import SEES_ALL, chain, noise_crosses, rows, run, sensor
 
 from components.sensor import declaration
-from components.sensor.declaration import SeenPlaces, scans_with_company
+from components.sensor.declaration import SeenPlaces, count_scans_with_neighbour
 
 
 def test_where_and_how_strong_noise_of_a_camera_is_are_drawn_each_by_itself():
@@ -100,7 +100,7 @@ def places(first, second, apart_s=0.5, angle_variance=(0.0, 0.0), range_variance
 def test_a_place_is_the_same_within_motion_and_three_deviations(second, variances, gates):
     for factor, scans in ((0.999, 2), (1.001, 1)):
         near = (second[0] * factor, 1000.0 + (second[1] - 1000.0) * factor)
-        found = scans_with_company(
+        found = count_scans_with_neighbour(
             places((0.0, 1000.0), near, **variances), np.array([1]), 3,
             speed_m_s=40.0, rate_rad_s=0.02,
         )  # fmt: skip
@@ -109,13 +109,13 @@ def test_a_place_is_the_same_within_motion_and_three_deviations(second, variance
 
 def test_places_of_a_scene_are_as_wrong_as_their_detections(monkeypatch):
     """High up an error of azimuth moves less: by the cosine of the elevation."""
-    seen, judged = [], declaration.scans_with_company
+    seen, judged = [], declaration.count_scans_with_neighbour
 
     def kept(found, *given, **keys):
         seen.append(found)
         return judged(found, *given, **keys)
 
-    monkeypatch.setattr(declaration, "scans_with_company", kept)
+    monkeypatch.setattr(declaration, "count_scans_with_neighbour", kept)
     high = {**crooked.ROLLING, "up_m": 2900.0}
     radar = sensor("radar.range_boundary", errors="stated", azimuth_error_deg=1.5,
                    elevation_error_deg=0.4, range_error_m=12.0, quantised=False,
@@ -180,10 +180,10 @@ def test_of_many_detections_only_neighbours_are_compared(monkeypatch, sweeps):
 
     monkeypatch.setattr(declaration, "_is_same_place", counted)
     gates = {"speed_m_s": 100.0, "rate_rad_s": 0.02}
-    found = scans_with_company(places, asked, 4, **gates)
+    found = count_scans_with_neighbour(places, asked, 4, **gates)
     few = sum(compared)
     compared.clear()
     monkeypatch.setattr(declaration, "_FEW_PAIRS", 10**12)
-    assert np.array_equal(found, scans_with_company(places, asked, 4, **gates))
+    assert np.array_equal(found, count_scans_with_neighbour(places, asked, 4, **gates))
     assert np.count_nonzero(found > 1) > 300
     assert sum(compared) == 3 * 6 * each**2 and few < 0.01 * sum(compared)

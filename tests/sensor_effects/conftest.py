@@ -4,10 +4,10 @@ from types import SimpleNamespace
 
 import pytest
 
-from dsa_des.record.notes import notes_of
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import join_row_columns
 from dsa_des.record.sinks import MemorySink
+from dsa_des.record.table_metadata import metadata_of_run
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
 
@@ -99,7 +99,7 @@ class Runs:
         memory = MemorySink()
         simulation = Simulation(load_scene(path), recorder=Recorder([memory]), **options)
         outcome = simulation.run()
-        notes = notes_of(simulation.recorded_messages(), "", 1, simulation.ticks_per_s)
+        notes = metadata_of_run(simulation.recorded_messages(), "", 1, simulation.ticks_per_s)
         return Made(
             tables=notes.attach(memory.tables()), plan=simulation.plan, simulation=simulation,
             outcome=outcome,

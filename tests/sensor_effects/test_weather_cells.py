@@ -14,7 +14,7 @@ from wired import HEARS_ALL, SEES_ALL, SENSORS, chain, rows, run, sensor
 
 import dsa_des
 from components.atmosphere.attenuation import rain_coefficients
-from components.environment.weather_cells import within_disc
+from components.environment.weather_cells import path_share_in_disc
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation
 
@@ -88,7 +88,7 @@ def test_a_radar_loses_what_the_chord_through_a_moving_circle_takes():
     dry = by_time(scene({"radar": {**HEARS_ALL, **SLOW}}), "snr_db")
     moving = cell(1700.0, 500.0, speed_mps=MOVES_MPS, towards_deg=60.0)
     wet = by_time(scene({"radar": {**HEARS_ALL, **SLOW}}, moving), "snr_db")
-    level = rain_coefficients(35e9).specific_attenuation(np.array([RATE_MM_H]), np.zeros(1))
+    level = rain_coefficients(35e9).specific_attenuation_db_km(np.array([RATE_MM_H]), np.zeros(1))
     chords = {t: chord_m(t, 1700.0, 500.0, MOVES) for t in dry}
     assert sum(0.0 < chord < 2.0 * RADIUS_M for chord in chords.values()) > 5
     for time_s, chord in chords.items():
@@ -205,7 +205,7 @@ def test_cells_that_change_and_move_give_the_same_bytes_in_any_window_and_beside
     same_as_alone(replicas_of(loaded, {}, farther), window=7)
     snr = by_time(made, "snr_db")
     dry = by_time(scene({"radar": {**HEARS_ALL, "scan_rate_hz": 2}}, duration_s=20), "snr_db")
-    level = rain_coefficients(35e9).specific_attenuation(np.array([RATE_MM_H]), np.zeros(1))
+    level = rain_coefficients(35e9).specific_attenuation_db_km(np.array([RATE_MM_H]), np.zeros(1))
     for time_s in (0.0, 5.5, 6.0, 19.5):
         if time_s < 6.0:
             chord = chord_m(time_s, 0.0, 2e3) + chord_m(time_s, 0.0, 6e3)
@@ -217,7 +217,7 @@ def test_cells_that_change_and_move_give_the_same_bytes_in_any_window_and_beside
 
 def test_a_path_straight_up_lies_in_a_circle_or_not():
     none = np.zeros(2)
-    within = within_disc(none, none, np.array([50.0, 150.0]), none, 100.0)
+    within = path_share_in_disc(none, none, np.array([50.0, 150.0]), none, 100.0)
     assert [each.tolist() for each in within] == [[0.0, 0.0], [1.0, 0.0]]
 
 

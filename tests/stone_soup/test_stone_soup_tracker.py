@@ -218,7 +218,7 @@ def test_order_draws_and_bytes_are_repeatable(tmp_path):
         np.random.seed(len(walks))  # noqa: NPY002
         before = np.random.get_state()[1].tolist(), random.getstate()  # noqa: NPY002
         junk = [object() for _ in range(len(walks) * 997)]
-        with ours.working():
+        with ours.isolated_random_state():
             tracks = [Track() for _ in range(40)]
             walked = [tracks.index(t) for t in set(tracks)]
             walks.append((walked, np.random.normal(), random.random()))  # noqa: NPY002

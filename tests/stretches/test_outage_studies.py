@@ -9,7 +9,7 @@ import dsa_des
 from docs.make.outages.__main__ import link_rows, moment_rows, risk_rows
 from dsa_des.cli import main
 from dsa_des.files.toml_files import to_toml
-from dsa_des.replicas.times_out import outage_times_of_seeds
+from dsa_des.replicas.outage_times import outage_times_of_seeds
 
 
 def runs_of(folder, *words, replicas):

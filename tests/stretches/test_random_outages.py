@@ -12,7 +12,7 @@ from dsa_des.record.failure_counts import failure_sentences
 from dsa_des.stretches.outage import Outage
 from dsa_des.stretches.outages import Outages
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 
 def outage(*blocks, **keys):
@@ -139,7 +139,7 @@ def test_a_frozen_radar_sends_its_last_detections_again_and_again():
     got = same_in_any_window(made, windows=(1, 5))
     same_as_alone(replicas_of(made, {}, {}, {}), window=30)
     simulation, never = tables_of(scene(change("blocks.radar.scan_rate_hz", 4), tracks=True))
-    spans = Outages(made.outages, Streams([3]), simulation.runs, 10**9).spans(0)
+    spans = Outages(made.outages, Streams([3]), simulation.runs, 10**9).outage_spans(0)
     columns = [n for n in never["scans"].column_names if n != "detected"]
     assert got["scans"].select(columns).equals(never["scans"].select(columns))
     ticks = never["scans"]["tick"].to_pylist()
@@ -166,7 +166,7 @@ def test_a_bit_that_sticks_is_set_in_every_value_while_it_does(quantity, column,
     stuck = {"mode": "stuck_bit", "stuck": {quantity: 512.0 if "m" in quantity[-2:] else 45.0}}
     made = scene(outages=[outage("radar", **stuck)])
     simulation, tables = tables_of(made)
-    spans = Outages(made.outages, Streams([3]), simulation.runs, 10**9).spans(0)
+    spans = Outages(made.outages, Streams([3]), simulation.runs, 10**9).outage_spans(0)
     got, never = tables["detections"], tables_of(scene())[1]["detections"]
     assert got.drop_columns([column]).equals(never.drop_columns([column]))
     out = [any(a <= t < b for a, b in spans) for t in never["tick"].to_pylist()]

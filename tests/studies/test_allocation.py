@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from dsa_des.arrays.types import FloatArray
-from dsa_des.results.ratio import FORESEEN_COST, paired_ratio, redistribute_lost, sampled_share
+from dsa_des.results.ratio import (
+    FORESEEN_COST,
+    paired_ratio,
+    redistribute_lost_runs,
+    share_from_flown_sample,
+)
 from dsa_des.studies.allocation import (
     FIRST_LEAST,
     LEAST,
@@ -12,14 +17,14 @@ from dsa_des.studies.allocation import (
     PREDICTED_FROM,
     Allocation,
     ForeseenRuns,
-    best_sample_size,
-    draw_runs,
+    best_probability_scale,
     event_chances,
-    fit_chances,
+    fit_logistic_coefficients,
     flight_probabilities,
     learn_allocation,
-    remaining_variance,
     round_ends,
+    sample_runs_to_fly,
+    sampling_variance,
 )
 
 #: Of a study.
@@ -73,9 +78,9 @@ def allocated(
         least = LEAST if start else FIRST_LEAST
         plan = learn_allocation(part_of(runs, known), happened[:, known], stands_for[known], least)
         here = part_of(runs, slice(start, end))
-        stands_for[start:end] = draw_runs(plan.probabilities(here), rng.uniform(size=end - start))[
-            1
-        ]
+        stands_for[start:end] = sample_runs_to_fly(
+            plan.probabilities(here), rng.uniform(size=end - start)
+        )[1]
         predicted[start:end] = plan.predictions(here)[0]
         start = end
     return stands_for, predicted
@@ -142,7 +147,7 @@ def test_copies_of_an_encounter_gain_as_much_less_as_they_have_in_common() -> No
     for _ in range(300):
         chance = np.repeat(rng.choice([0.05, 0.75], 300), 8)
         happened = (rng.uniform(size=2400) < chance).astype(float)
-        s = draw_runs(np.full(2400, 0.4), rng.uniform(size=2400).tolist())[1]
+        s = sample_runs_to_fly(np.full(2400, 0.4), rng.uniform(size=2400).tolist())[1]
         both = {"cluster": np.repeat(np.arange(300), 8)}
         one = paired_ratio(np.ones(2400), happened, stands_for=s, **both)
         gains.append(one.gain)
@@ -210,7 +215,7 @@ def test_the_size_of_the_probabilities_has_the_least_variance_times_cost() -> No
         variance = (many * p / pi).sum() + many[0] * (ratio**2 - 2.0 * ratio * p[0])
         return float(variance * ((many * pi).sum() / 1000 + FORESEEN_COST))
 
-    precision, size = best_sample_size(
+    precision, size = best_probability_scale(
         runs, np.repeat(p, many)[np.newaxis], np.array([False]), LEAST
     )
     mine = flight_probabilities(np.sqrt(precision[0] * p), size, LEAST)
@@ -228,7 +233,7 @@ def test_chances_are_those_that_a_grid_search_finds_likeliest() -> None:
     terms = rng.standard_normal((1, 400))
     happened = (rng.uniform(size=400) < 1.0 / (1.0 + np.exp(1.0 - 0.8 * terms[0]))).astype(float)
     expected = np.full(400, 0.2)
-    level, belief, slope = fit_chances(terms, expected, happened, np.ones(400))
+    level, belief, slope = fit_logistic_coefficients(terms, expected, happened, np.ones(400))
 
     def loss(a: float, k: float, b: float) -> float:
         p = 1.0 / (1.0 + np.exp(-(a + b * terms[0] + (1.0 + k) * np.log(0.25))))
@@ -247,7 +252,7 @@ def test_what_was_expected_is_believed_no_more_where_it_is_wrong() -> None:
     expected = 10.0 ** rng.uniform(-8.0, -2.0, 600)
     happened = (rng.uniform(size=600) < 0.2).astype(float)
     none = np.zeros((1, 600))
-    fitted = fit_chances(none, expected, happened, np.ones(600))
+    fitted = fit_logistic_coefficients(none, expected, happened, np.ones(600))
     runs = ForeseenRuns(none, none, expected[np.newaxis], np.ones(600))
     chance = event_chances(none, runs, np.stack([fitted, fitted])[np.newaxis])[0]
     assert chance.min() > 0.1 and chance.max() < 0.35
@@ -266,7 +271,7 @@ def test_a_plan_that_flies_all_stands_for_one_each() -> None:
         np.zeros(1), np.ones(1), np.zeros((1, 2, 5)), np.ones(1), float("inf"), np.array([False])
     )
     runs = ForeseenRuns(np.zeros((1, 3)), np.ones((1, 3)), np.full((1, 3), 0.2), np.ones(3))
-    flown, stands_for = draw_runs(plan.probabilities(runs), [0.0, 0.5, 0.999])
+    flown, stands_for = sample_runs_to_fly(plan.probabilities(runs), [0.0, 0.5, 0.999])
     assert flown.all() and stands_for.tolist() == [1.0, 1.0, 1.0]
 
 
@@ -318,25 +323,25 @@ def test_an_event_that_was_seen_often_is_predicted_and_the_sure_are_flown_less()
     found = sure.predictions(runs)[0][runs.nominal[0] > 0.0]
     assert np.abs(found - truth).mean() < 0.1
     both = np.array([[0.5, 0.9], [0.5, 0.9]])
-    open_ = remaining_variance(both, np.array([True, False]))
+    open_ = sampling_variance(both, np.array([True, False]))
     assert open_ == pytest.approx(np.array([[0.25, 0.09], [0.5, 0.9]]))
 
 
 def test_a_share_of_a_sample_is_the_surer_of_two_and_never_above_1() -> None:
     rng = np.random.default_rng(8)
     whole, chance = np.ones(400), np.repeat([0.05, 0.8], 200)
-    s = draw_runs(chance, rng.uniform(size=400).tolist())[1]
+    s = sample_runs_to_fly(chance, rng.uniform(size=400).tolist())[1]
     weight = np.ones(400)
-    every = sampled_share(whole, whole, weight, s, predicted=None)
+    every = share_from_flown_sample(whole, whole, weight, s, predicted=None)
     # One that nobody saw stands for twenty: 3.69 of these may be missing of 400.
     assert every.ratio == every.interval[1] == 1.0
     assert every.interval[0] == pytest.approx(1.0 - 3.69 * 20 / 400, abs=0.01)
     part = (rng.uniform(size=400) < 0.7).astype(float)
-    large = sampled_share(whole, part, weight, s, predicted=None)
+    large = share_from_flown_sample(whole, part, weight, s, predicted=None)
     assert large.ratio == pytest.approx((s * part).sum() / s.sum())  # Hájek's
     rare = np.zeros(400)
     rare[-2:] = (s[-2:] > 0.0) | (np.arange(2) > 0)
-    seldom = sampled_share(whole, rare, weight, s, predicted=None)
+    seldom = share_from_flown_sample(whole, rare, weight, s, predicted=None)
     plain = paired_ratio(whole, rare, stands_for=s)
     assert seldom.standard_error <= plain.standard_error
     assert seldom.flown == plain.flown == np.count_nonzero(s)
@@ -350,12 +355,12 @@ def test_what_failed_runs_stood_for_is_shared_by_those_flown_of_their_cell() -> 
     stands_for, first = np.array([1.0, 0.0, 3.0, 5.0, 2.0]), np.array([1, 1, 1, 1, 0], dtype=bool)
     # One that stood for four leaves out itself, and three others; those of unknown runs are as many
     # as the others on average: (0 + 2 + 4) / 3.
-    assert redistribute_lost(stands_for, [4.0, np.nan], first) == pytest.approx(
+    assert redistribute_lost_runs(stands_for, [4.0, np.nan], first) == pytest.approx(
         [1.0, 0.0, 3.0 + 2.0 * 5.0 / 6.0, 5.0 + 4.0 * 5.0 / 6.0, 2.0]
     )
-    assert redistribute_lost(stands_for, [1.0, 0.0], first).tolist() == stands_for.tolist()
+    assert redistribute_lost_runs(stands_for, [1.0, 0.0], first).tolist() == stands_for.tolist()
     nobody = np.array([1.0, 0.0])
-    assert redistribute_lost(nobody, [7.0], np.array([True, True])) is nobody
+    assert redistribute_lost_runs(nobody, [7.0], np.array([True, True])) is nobody
 
 
 def test_a_ratio_is_unbiased_where_a_tenth_of_the_runs_fails() -> None:
@@ -364,10 +369,12 @@ def test_a_ratio_is_unbiased_where_a_tenth_of_the_runs_fails() -> None:
     for _ in range(400):
         runs, happened = encounters(rng, 1000)
         chance = np.where(runs.nominal[0] > 0.0, 0.6, 0.1)
-        s = draw_runs(chance, rng.uniform(size=1000).tolist())[1]
+        s = sample_runs_to_fly(chance, rng.uniform(size=1000).tolist())[1]
         failed = (rng.uniform(size=1000) < 0.1) & (s > 0.0)
         kept = ~failed
-        lost = redistribute_lost(s[kept], s[failed].tolist(), np.ones(int(kept.sum()), dtype=bool))
+        lost = redistribute_lost_runs(
+            s[kept], s[failed].tolist(), np.ones(int(kept.sum()), dtype=bool)
+        )
         found.append(paired_ratio(runs.nominal[0][kept], happened[0][kept], stands_for=lost).ratio)
         whole.append(paired_ratio(runs.nominal[0], happened[0]).ratio)
     error = float(np.std(found)) / 20.0

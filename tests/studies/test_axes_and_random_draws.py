@@ -12,8 +12,8 @@ from dsa_des.errors import SceneError
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import beat_period_s, flatten_axes, parse_axis
-from dsa_des.studies.draws import exact_clock_value, parse_draw, replica_seed
-from dsa_des.studies.identity import record_of
+from dsa_des.studies.draws import parse_draw, replica_seed, round_for_exact_clock
+from dsa_des.studies.study_digest import record_of
 from dsa_des.studies.study_file import read_study
 
 
@@ -95,9 +95,9 @@ def test_a_draw_knows_nothing_but_its_own_key() -> None:
 
 
 def test_drawn_times_and_rates_keep_clocks_exact() -> None:
-    assert exact_clock_value("blocks.a.offset_s", 0.1234567891234) == Fraction(123456789, 10**9)
-    assert exact_clock_value("blocks.a.scan_rate_hz", 4.98765) == Fraction(4988, 1000)
-    assert exact_clock_value("blocks.a.rate_deg_s", 1.23456789012) == 1.23456789012
+    assert round_for_exact_clock("blocks.a.offset_s", 0.1234567891234) == Fraction(123456789, 10**9)
+    assert round_for_exact_clock("blocks.a.scan_rate_hz", 4.98765) == Fraction(4988, 1000)
+    assert round_for_exact_clock("blocks.a.rate_deg_s", 1.23456789012) == 1.23456789012
 
 
 def test_all_cells_share_seeds_and_draws(small: Path) -> None:

@@ -17,9 +17,9 @@ from dsa_des.studies import executors
 from dsa_des.studies.attempts import TRIES, Attempts, split_chunk
 from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
 from dsa_des.studies.executors import Local
-from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import run_study
 from dsa_des.studies.study import Chunk
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 
 STUDY = """
@@ -96,10 +96,10 @@ def test_kills_from_outside_make_no_error_rows(small: Path) -> None:
     Path("study.toml").write_text(text.replace("runs_per_chunk = 3", "runs_per_chunk = 1"))
     checked = read_study("study.toml")
     alone = StudyFolder(Path("alone"))
-    alone.open(description_text(checked), resume=False)
+    alone.open(study_json_text(checked), resume=False)
     run_study(checked, alone, executors.Serial())
     folder = StudyFolder(Path("o"))
-    folder.open(description_text(checked), resume=False)
+    folder.open(study_json_text(checked), resume=False)
     local = Local(2)
     killed = []
 
@@ -136,7 +136,7 @@ class _Process:
         module = "dsa_des.studies.attempts"
         monkeypatch.setattr(f"{module}.join_pieces", lambda name, parts: self.sum(name, parts))
         monkeypatch.setattr(
-            f"{module}.crashed_run",
+            f"{module}.crashed_chunk_result",
             lambda study, chunk, tries: ChunkResult(chunk.name, b"", 1, 1, 1),
         )
         self.deaths: list[Chunk] = []
@@ -151,9 +151,9 @@ class _Process:
             runs = [run for chunk in piece.chunks for run in chunk.runs]
             if {k for _, start, end in runs for k in range(start, end)} & guilty:
                 self.deaths += piece.chunks
-                found += attempts.take_back(piece)
+                found += attempts.retry_after_crash(piece)
             else:
-                found += attempts.finish(
+                found += attempts.take_results(
                     piece, [ChunkResult(chunk.name, b"", len(chunk), 0) for chunk in piece.chunks]
                 )
         return found
@@ -184,9 +184,9 @@ def test_a_last_try_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     attempts = Attempts(None, [(Chunk("a", ((0, 0, 1),)),), (Chunk("b", ((0, 1, 2),)),)])  # type: ignore[arg-type]
     first, second = attempts.next_piece(), attempts.next_piece()
     assert first is not None and second is not None
-    attempts.take_back(first)
+    attempts.retry_after_crash(first)
     assert attempts.next_piece() is None  # the other one is still under way
-    attempts.finish(second, [ChunkResult("b", b"", 1, 0)])
+    attempts.take_results(second, [ChunkResult("b", b"", 1, 0)])
     again = attempts.next_piece()
     assert again is not None and again.chunks[0].name == "a" and attempts.next_piece() is None
 

@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 from dsa_des.block.component import ClockedParameters, Component
 from dsa_des.replicas import drawn_columns as checked
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.replicas.drawn_columns import drawn_columns
+from dsa_des.replicas.drawn_columns import scenes_from_drawn_columns
 from dsa_des.replicas.replicas import Failed, Recorded, run_replicas
 from dsa_des.scene.scene import load_scene
 
@@ -40,7 +40,7 @@ SHAPES: dict[str, dict[str, Any]] = {
 def test_scenes_are_those_of_each_replica_by_itself(small: Path, drawn: dict[str, Any]) -> None:
     base = load_scene("small.toml")
     runs = replicas(**drawn)
-    together = drawn_columns(base, runs)
+    together = scenes_from_drawn_columns(base, runs)
     assert together is not None and len(together[2:]) == _MANY - 2
     for number, replica in enumerate(runs):
         alone = replica_scene(base, replica)
@@ -79,12 +79,12 @@ ONE_BY_ONE: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("drawn", ONE_BY_ONE.values(), ids=ONE_BY_ONE)
 def test_what_no_column_can_show_is_checked_one_by_one(small: Path, drawn: dict[str, Any]) -> None:
-    assert drawn_columns(load_scene("small.toml"), replicas(**drawn)) is None
+    assert scenes_from_drawn_columns(load_scene("small.toml"), replicas(**drawn)) is None
 
 
 def test_keys_that_not_all_change_are_checked_one_by_one(small: Path) -> None:
     runs = replicas(**SHAPES["offsets"])
-    assert drawn_columns(load_scene("small.toml"), [*runs, Replica(1)]) is None
+    assert scenes_from_drawn_columns(load_scene("small.toml"), [*runs, Replica(1)]) is None
 
 
 @pytest.mark.parametrize(
@@ -166,7 +166,7 @@ def test_what_validators_read_is_no_column(
     block = base.blocks["radar"]
     object.__setattr__(block, "cls", Own)
     object.__setattr__(block, "parameters", model(scan_rate_hz=5))  # type: ignore[arg-type]
-    found = drawn_columns(base, replicas(**{f"radar.{key}": float}))
+    found = scenes_from_drawn_columns(base, replicas(**{f"radar.{key}": float}))
     assert (found is not None) == as_column
 
 
@@ -182,4 +182,4 @@ def test_a_clock_of_its_own_making_is_asked_one_by_one(small: Path) -> None:
     for model, as_column in ((ClockedParameters, True), (OwnClock, False)):
         object.__setattr__(block, "cls", type("Own", (Component,), {"Parameters": model}))
         object.__setattr__(block, "parameters", model(scan_rate_hz=5))  # type: ignore[arg-type]
-        assert (drawn_columns(base, drawn) is not None) == as_column
+        assert (scenes_from_drawn_columns(base, drawn) is not None) == as_column

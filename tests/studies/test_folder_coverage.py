@@ -12,7 +12,7 @@ import pytest
 
 from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies import study as study_module
-from dsa_des.studies.identity import results_of
+from dsa_des.studies.study_digest import results_of
 from dsa_des.studies.study_file import read_study
 from tests.results.conftest import rows_of_table
 from tests.support.encounter_folder import rows_of, write_encounter, write_scene

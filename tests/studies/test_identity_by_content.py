@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from dsa_des.cli import main
-from dsa_des.studies.identity import record_of
+from dsa_des.studies.study_digest import record_of
 from dsa_des.studies.study_file import read_study
 
 CONFIGS = Path(__file__).parents[2] / "configs"

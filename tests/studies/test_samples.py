@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from dsa_des.studies.draws import axis_value_identity, member_seed
-from dsa_des.studies.identity import record_of
+from dsa_des.studies.study_digest import record_of
 from dsa_des.studies.study_file import read_study
 from tests.support.encounter_folder import rows_of, write_encounter, write_scene, write_study
 

@@ -11,13 +11,13 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from dsa_des.commands.study import report_finished_study, run_into
+from dsa_des.commands.study import report_finished_study, run_study_into_folder
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.statistics import wilson_interval
 from dsa_des.studies.executors import Dask, run_and_write
-from dsa_des.studies.identity import description_text
 from dsa_des.studies.runner import Stopped, run_study
+from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study
 from tests import warm_process
 from tests.support.waiting import wait_for
@@ -42,7 +42,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 def undisturbed(name: str = "alone", repeat: str = "") -> dict[str, bytes]:
     study = read_study("study.toml")
     study.repeat = repeat
-    report_finished_study(study, run_into(study, Path(name), 1, False), quiet=True)
+    report_finished_study(study, run_study_into_folder(study, Path(name), 1, False), quiet=True)
     return contents(Path(name))
 
 
@@ -99,7 +99,7 @@ def test_a_killed_worker_changes_nothing(small: Path) -> None:
     whole = undisturbed()
     flag.unlink()
     study = read_study("study.toml")
-    report_finished_study(study, run_into(study, Path("pool"), 2, False), quiet=True)
+    report_finished_study(study, run_study_into_folder(study, Path("pool"), 2, False), quiet=True)
     assert flag.exists()
     assert contents(Path("pool")) == whole
 
@@ -109,7 +109,7 @@ def test_a_poisoned_run_does_not_stop_the_study(small: Path) -> None:
     extra = '"blocks.ir.flaw" = { choice = ["none", "none", "none", "raise"] }\n"blocks.traffic'
     Path("study.toml").write_text(text.replace('"blocks.traffic', extra))
     study = read_study("study.toml")
-    folder = run_into(study, Path("poisoned"), 1, False)
+    folder = run_study_into_folder(study, Path("poisoned"), 1, False)
     rows = folder.results().to_pylist()
     bad = [row for row in rows if row["error"]]
     assert len(rows) == 48 and 0 < len(bad) < 24
@@ -140,7 +140,7 @@ def test_a_full_disk_leaves_a_resumable_folder(small: Path) -> None:
     done = sorted(path.name for path in Path("full/parts").iterdir())
     assert all(name.endswith(".parquet") and not name.startswith(".") for name in done)
     study = read_study("study.toml")
-    report_finished_study(study, run_into(study, Path("full"), 1, True), quiet=True)
+    report_finished_study(study, run_study_into_folder(study, Path("full"), 1, True), quiet=True)
     assert contents(Path("full")) == whole
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != limit
 
@@ -158,7 +158,7 @@ def test_ctrl_c_leaves_a_resumable_folder(released: Path) -> None:
     assert "continue with" in stderr and "Traceback" not in stderr
     released.touch()
     study = read_study("study.toml")
-    report_finished_study(study, run_into(study, Path("stopped"), 1, True), quiet=True)
+    report_finished_study(study, run_study_into_folder(study, Path("stopped"), 1, True), quiet=True)
     assert contents(Path("stopped")) == whole
 
 
@@ -166,7 +166,7 @@ def test_a_part_that_cannot_be_read_is_run_again(small: Path) -> None:
     whole = undisturbed()
     (Path("alone/parts") / "part-000-000002.parquet").write_bytes(b"torn")
     study = read_study("study.toml")
-    report_finished_study(study, run_into(study, Path("alone"), 1, True), quiet=True)
+    report_finished_study(study, run_study_into_folder(study, Path("alone"), 1, True), quiet=True)
     assert contents(Path("alone")) == whole
 
 
@@ -176,7 +176,7 @@ def test_no_results_of_another_study_are_mixed_in(small: Path) -> None:
     Path("study.toml").write_text(text)
     folder = StudyFolder(Path("alone"))
     with pytest.raises(Exception, match="another study"):
-        folder.open(description_text(read_study("study.toml")), resume=True)
+        folder.open(study_json_text(read_study("study.toml")), resume=True)
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -189,7 +189,7 @@ def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path
     flag.unlink()
     study = read_study("study.toml")
     folder = StudyFolder(Path("dask"))
-    folder.open(description_text(study), resume=False)
+    folder.open(study_json_text(study), resume=False)
     old = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = str(small)
     try:
@@ -211,7 +211,7 @@ def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path
 def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = read_study("study.toml")
     folder = StudyFolder(Path("broken"))
-    folder.open(description_text(study), resume=False)
+    folder.open(study_json_text(study), resume=False)
 
     def full(path: object, content: bytes, **how: bool) -> None:
         raise OSError(28, "No space left on device")
@@ -227,8 +227,8 @@ def test_an_error_of_the_disk_is_told_as_such(small: Path, monkeypatch: pytest.M
 def test_who_does_not_find_the_study_writes_nothing(small: Path) -> None:
     study = read_study("study.toml")
     folder = StudyFolder(Path("o"))
-    folder.open(description_text(study), resume=False)
-    other, gone = replace(folder.destination, study_sha256="0"), Path("moved").resolve()
+    folder.open(study_json_text(study), resume=False)
+    other, gone = replace(folder.parts_destination, study_sha256="0"), Path("moved").resolve()
     for parts, why in (
         (other, "holds another study"),
         (replace(other, folder=gone), rf"{gone}: is not the folder of a study.*by this name"),
@@ -249,13 +249,13 @@ def test_a_cell_stops_when_its_interval_is_narrow_enough(small: Path) -> None:
     stop = 'stop_when = {metric = "detected.radar", half_width = 0.2, batch = 6}\n[axes]'
     Path("study.toml").write_text(text.replace("[axes]", stop))
     study = read_study("study.toml")
-    rows = run_into(study, Path("stops"), 1, False).results().to_pylist()
+    rows = run_study_into_folder(study, Path("stops"), 1, False).results().to_pylist()
     for cell in (0, 1):
         mine = [row["detected.radar"] for row in rows if row["cell"] == cell]
         assert len(mine) in (6, 12, 18, 24)
         assert half_width(mine) <= 0.2 or len(mine) == 24
         assert len(mine) == 6 or half_width(mine[:-6]) > 0.2
-    resumed = run_into(study, Path("stops"), 1, True).results().to_pylist()
+    resumed = run_study_into_folder(study, Path("stops"), 1, True).results().to_pylist()
     assert resumed == rows
 
 
@@ -270,5 +270,5 @@ def test_a_damaged_part_is_named_and_written_anew(small: Path) -> None:
     part.write_bytes(part.read_bytes()[:100])
     with pytest.raises(UsageError, match=r"part-000-000001\.parquet; --resume writes"):
         StudyFolder(Path("whole")).results()
-    run_into(read_study("study.toml"), Path("whole"), 1, True)
+    run_study_into_folder(read_study("study.toml"), Path("whole"), 1, True)
     assert part.read_bytes() == whole["parts/part-000-000001.parquet"]

@@ -81,9 +81,10 @@ blocks.eo.offset_s = {{ uniform = [0.03, 0.04] }}
     (row,) = folder.results().to_pylist()
     command = folder.record.command(row)
     seen: list[object] = []
-    monkeypatch.setattr(models, "scene_errors", lambda variants, report: seen.append(variants)
+    monkeypatch.setattr(models, "model_errors_in_scene", lambda variants,
+    report: seen.append(variants)
                         or ([], []))  # fmt: skip
-    models.measure_errors(folder)
+    models.measure_and_store_errors(folder)
     (variants,) = seen
     scene = variants.scene  # type: ignore[attr-defined]
     assert scene.seed == row["seed"] and float(scene.duration_s) == 2.0

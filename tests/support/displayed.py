@@ -29,7 +29,7 @@ def displayed(
     recorder = Recorder([tables])
     simulation = Simulation(dsa_des.load_scene(scene), recorder=recorder, window=window)
     scope = Scope(simulation)
-    recorder.listeners.append(scope.listen)
+    recorder.listeners.append(scope.store_message)
     if look is not None:
         per_s = simulation.ticks_per_s
         recorder.listeners.append(lambda _, message: look(scope, int(message.tick[-1]) / per_s))

@@ -6,11 +6,11 @@ import pytest
 
 import dsa_des
 from components.surveillance.interrogation import (
-    answered_in_round,
+    answer_probability_per_round,
     bearing_deviation_rad,
-    is_near,
-    reach_m,
+    is_met_within,
     sine_of_elevation,
+    transponder_reach_m,
 )
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -129,9 +129,11 @@ def test_who_is_near_is_told_by_what_is_measured(scene):
 
 def test_reach_is_by_sector():
     bearing = np.radians([0.0, 45.0, 46.0, -135.0, 136.0, 180.0])
-    nmi = reach_m(bearing, np.zeros(6, dtype=bool)) / 1852.0
+    nmi = transponder_reach_m(bearing, np.zeros(6, dtype=bool)) / 1852.0
     assert nmi == pytest.approx([20.6, 20.6, 14.3, 14.3, 8.0, 8.0])
-    assert reach_m(bearing, np.ones(6, dtype=bool)) / 1852.0 == pytest.approx([15.6] * 6)
+    assert transponder_reach_m(bearing, np.ones(6, dtype=bool)) / 1852.0 == pytest.approx(
+        [15.6] * 6
+    )
 
 
 def test_a_scene_without_a_reach_asks_as_far_as_anybody_answers(scene):
@@ -169,9 +171,11 @@ def test_bearings_are_off_the_nose_whatever_the_heading_is_believed_to_be(scene)
 
 
 def test_pure_functions():
-    assert 1.0 - (1.0 - answered_in_round(np.array([0.95]))[0]) ** 10 == pytest.approx(0.95)
+    assert 1.0 - (1.0 - answer_probability_per_round(np.array([0.95]))[0]) ** 10 == pytest.approx(
+        0.95
+    )
     assert np.degrees(bearing_deviation_rad(np.radians([9.9, -10.1]))) == pytest.approx([9.0, 15.0])
-    near = is_near(np.array([3000.0, 3000.0, 100.0]), np.array([-51.0, -49.0, 5.0]), 60.0)
+    near = is_met_within(np.array([3000.0, 3000.0, 100.0]), np.array([-51.0, -49.0, 5.0]), 60.0)
     assert near.tolist() == [True, False, False]
     # At the ownship's own altitude an aircraft 30 km away lies below the horizontal.
     assert np.degrees(sine_of_elevation(np.zeros(1), np.array([30e3])))[0] == pytest.approx(

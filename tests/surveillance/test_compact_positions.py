@@ -11,7 +11,7 @@ from components.surveillance.compact_position import (
     decode_near,
     decode_pair,
     encode,
-    longitude_zones,
+    number_of_longitude_zones,
 )
 from components.surveillance.extended_squitter import (
     is_intact,
@@ -63,9 +63,11 @@ def test_a_message_with_a_wrong_bit_is_not_intact(bit):
 
 def test_zones_change_at_the_latitudes_of_the_standard():
     for zones, lat in CHANGES.items():
-        sides = longitude_zones(np.array([lat - 1e-7, lat + 1e-7, -lat + 1e-7, -lat - 1e-7]))
+        sides = number_of_longitude_zones(
+            np.array([lat - 1e-7, lat + 1e-7, -lat + 1e-7, -lat - 1e-7])
+        )
         assert sides.tolist() == [zones, zones - 1] * 2
-    assert longitude_zones([0.0, 90.0, -90.0]).tolist() == [59, 1, 1]
+    assert number_of_longitude_zones([0.0, 90.0, -90.0]).tolist() == [59, 1, 1]
 
 
 def places():
@@ -91,7 +93,7 @@ def test_messages_decode_to_the_place_within_half_a_part(odd):
     there = decode_near(found.y, found.x, found.odd, lat + 1.0 * (np.abs(lat) < 85), lon)
     assert np.abs(there[0] - lat).max() <= 360 / (60 - odd) / 2**18 * 1.0001
     away = np.abs(np.mod(there[1] - lon + 180.0, 360.0) - 180.0)
-    zones = np.maximum(longitude_zones(there[0]) - odd, 1)
+    zones = np.maximum(number_of_longitude_zones(there[0]) - odd, 1)
     assert (away <= 360.0 / zones / 2**18 * 1.0001).all()
 
 

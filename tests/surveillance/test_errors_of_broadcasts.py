@@ -44,10 +44,10 @@ def test_errors_have_the_stated_deviation_and_last(errors, name):
     them, number = who(N), np.arange(N) % 300
     instant = number * NS // 2
     own = Broadcasts(Streams(7), errors, False)
-    now = np.stack(own.level_errors(name, np.full(N, 12.3), them, number, instant))
+    now = np.stack(own.horizontal_errors(name, np.full(N, 12.3), them, number, instant))
     lag_s = 90.0
     later = np.stack(
-        own.level_errors(name, np.full(N, 12.3), them, number + 180, instant + int(lag_s * NS))
+        own.horizontal_errors(name, np.full(N, 12.3), them, number + 180, instant + int(lag_s * NS))
     )
     lasts = errors == "gauss_markov"
     pairs = [(now[0], later[0], lasts), (now[1], later[1], lasts), (now[0], now[1], False)]
@@ -63,7 +63,9 @@ def test_nacp_is_the_radius_that_holds_95_percent():
     them = who(N)
     own = Broadcasts(Streams(8), "gauss_markov", False)
     sigma = np.full(N, POSITION_RADIUS_M[8] / RADIUS_IN_DEVIATIONS)
-    inside = np.hypot(*own.level_errors("position", sigma, them, np.arange(N), np.arange(N))) < 92.6
+    inside = (
+        np.hypot(*own.horizontal_errors("position", sigma, them, np.arange(N), np.arange(N))) < 92.6
+    )
     assert abs(inside.mean() - 0.95) < Z * (0.95 * 0.05 / N) ** 0.5
 
 
@@ -96,7 +98,7 @@ def test_a_layer_s_top_is_of_the_layer_for_errors_as_for_their_variance():
 def test_intervals_are_uniform_and_start_as_if_they_had_always_run():
     them, count = who(2000), 14
     clocks = SquitterClocks(Stream(9, "a", "b"))
-    _, sent, counts = clocks.latest(them.keys, them.run, np.full(2000, 30 * NS), count)
+    _, sent, counts = clocks.latest_messages(them.keys, them.run, np.full(2000, 30 * NS), count)
     assert counts.all()
     gaps = -np.diff(sent, axis=1).ravel() / NS
     n = gaps.size
@@ -107,7 +109,7 @@ def test_intervals_are_uniform_and_start_as_if_they_had_always_run():
     assert abs(np.corrcoef(gaps[:-1], gaps[1:])[0, 1]) < Z / n**0.5
     # At any instant the last message is (E gap²) / (2 E gap) old on average.
     age = 30.0 - sent[:, 0] / NS
-    for ages in (age, clocks.latest(them.keys, them.run, np.full(2000, NS), 1)[1][:, 0]):
+    for ages in (age, clocks.latest_messages(them.keys, them.run, np.full(2000, NS), 1)[1][:, 0]):
         ages = ages if ages is age else 1.0 - ages / NS
         mean = (0.5**2 + 0.2**2 / 12) / (2 * 0.5)
         assert abs(ages.mean() - mean) < Z * 0.15 / 2000**0.5
@@ -118,22 +120,22 @@ def test_a_clock_says_the_same_whatever_was_asked_before():
     until = np.sort(np.random.default_rng(1).integers(0, 500 * NS, 200))
     keys, runs = np.tile(them.keys, 200), np.tile([0, 0, 3, 7], 200)
     instants = np.repeat(until, 4)
-    whole = SquitterClocks(Stream(2, "a", "b")).latest(keys, runs, instants, 6)
+    whole = SquitterClocks(Stream(2, "a", "b")).latest_messages(keys, runs, instants, 6)
     other = SquitterClocks(Stream(2, "a", "b"))
     for k in np.random.default_rng(2).permutation(len(keys))[:80]:
-        one = other.latest(keys[k : k + 1], runs[k : k + 1], instants[k : k + 1], 6)
+        one = other.latest_messages(keys[k : k + 1], runs[k : k + 1], instants[k : k + 1], 6)
         assert all(np.array_equal(part[0], all_[k]) for part, all_ in zip(one, whole, strict=True))
     # Days later it is still a matter of the clock's own messages.
-    number, sent, _ = other.latest(keys[:1], runs[:1], np.array([86_400 * NS]), 1)
+    number, sent, _ = other.latest_messages(keys[:1], runs[:1], np.array([86_400 * NS]), 1)
     assert abs(number[0, 0] / 172_800 - 1.0) < 1e-3 and 0 <= 86_400 * NS - sent[0, 0] < 0.6 * NS
 
 
 def test_what_is_sent_at_an_instant_is_sent_by_then_and_no_nanosecond_before():
     them, clocks = who(50), SquitterClocks(Stream(2, "a", "b"))
-    _, sent, _ = clocks.latest(them.keys, them.run, np.full(50, 90 * NS), 2)
-    _, then, _ = clocks.latest(them.keys, them.run, sent[:, 0], 2)
+    _, sent, _ = clocks.latest_messages(them.keys, them.run, np.full(50, 90 * NS), 2)
+    _, then, _ = clocks.latest_messages(them.keys, them.run, sent[:, 0], 2)
     assert np.array_equal(then, sent)
-    _, before, _ = clocks.latest(them.keys, them.run, sent[:, 0] - 1, 1)
+    _, before, _ = clocks.latest_messages(them.keys, them.run, sent[:, 0] - 1, 1)
     assert np.array_equal(before[:, 0], sent[:, 1])
 
 
@@ -148,7 +150,7 @@ def test_positions_carried_on_err_by_the_error_of_the_velocity_times_their_age()
     stated = StatedByAircraft(
         SimpleNamespace(**deviations), np.zeros(3, dtype=int), said, errs=True, rounds=False
     )
-    north, east, _ = stated.position_m2(np.array([0.0, 0.5, 3.0]))
+    north, east, _ = stated.position_variances_m2(np.array([0.0, 0.5, 3.0]))
     assert north.tolist() == east.tolist() == [400.0, 401.0, 436.0]
 
 

@@ -34,7 +34,7 @@ def test_every_position_is_reported_once(clock):
         name = target["name"]
         key = target_keys((name,))
         sent = np.concatenate([
-            clocks.latest(key, np.zeros(1, int), np.array([until_s * 10**9]), 14)[1][0]
+            clocks.latest_messages(key, np.zeros(1, int), np.array([until_s * 10**9]), 14)[1][0]
             for until_s in range(1, duration_s + 1)
         ])  # fmt: skip
         sent = np.unique(sent) / 1e9

@@ -11,16 +11,16 @@ from scipy.ndimage import map_coordinates
 from wired import chain
 
 import dsa_des
-from components.flights.bounds import _place, check_above_terrain, check_on_raster
+from components.flights.bounds import _position_bounds, check_above_terrain, check_on_raster
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
-    bent_elevation_rad,
-    geodetic_of,
+    geodetic_lat_rad_lon_deg,
     horizon_dip_rad,
     is_behind_limb,
     is_behind_terrain,
-    miss_bound_m,
+    max_undetected_ground_m,
     rays_between,
+    refracted_elevation_rad,
 )
 from docs.make.synthetic_raster import NAME, main, synthetic_heights_m
 from dsa_des.errors import SceneError
@@ -53,7 +53,7 @@ def test_places_by_bowring():
         rng.uniform(-180, 180, 300),
         rng.uniform(-5e2, 5e4, 300),
     )
-    found = geodetic_of(*map(np.asarray, pymap3d.geodetic2ecef(lat, lon, alt)))
+    found = geodetic_lat_rad_lon_deg(*map(np.asarray, pymap3d.geodetic2ecef(lat, lon, alt)))
     np.testing.assert_allclose(np.degrees(found[0]), lat, atol=1e-9)
     np.testing.assert_allclose(found[1], lon, atol=1e-9)
     np.testing.assert_allclose(found[2], alt, atol=1e-5)
@@ -101,12 +101,12 @@ def test_the_range_to_the_horizon_is_that_of_the_textbook(refraction, factor):
 
 
 def test_bending_and_dip():
-    assert math.degrees(bent_elevation_rad(0.0, 20e3)) == pytest.approx(0.0225, abs=5e-5)
-    assert bent_elevation_rad(0.3, 2e4, "none") == 0.3
-    assert bent_elevation_rad(math.pi / 2, 1e4) == math.pi / 2
+    assert math.degrees(refracted_elevation_rad(0.0, 20e3)) == pytest.approx(0.0225, abs=5e-5)
+    assert refracted_elevation_rad(0.3, 2e4, "none") == 0.3
+    assert refracted_elevation_rad(math.pi / 2, 1e4) == math.pi / 2
     # The bent ray over the round Earth is the straight one over the Earth of 4/3: h2 there.
     el, range_m = 0.02, 60e3
-    rises = math.tan(bent_elevation_rad(el, range_m)) - math.tan(el)
+    rises = math.tan(refracted_elevation_rad(el, range_m)) - math.tan(el)
     assert rises * range_m == pytest.approx(range_m**2 / (8 * R), rel=2e-3)
     assert math.degrees(horizon_dip_rad(1000.0)) == pytest.approx(
         math.degrees(math.acos(R / (R + 1e3)))
@@ -116,7 +116,7 @@ def test_bending_and_dip():
     )
     assert horizon_dip_rad(-5.0) == 0.0
     with pytest.raises(ValueError, match="refraction is 'air'"):
-        bent_elevation_rad(0.0, 1.0, "air")
+        refracted_elevation_rad(0.0, 1.0, "air")
 
 
 def ridges():
@@ -137,10 +137,10 @@ def test_heights_between_nodes_across_the_antimeridian():
         rng.uniform(-42.3, -40.7, 200),
         np.mod(rng.uniform(179.3, 180.7, 200) + 180, 360) - 180,
     )
-    found, inside = raster.height(lat, lon)
+    found, inside = raster.heights_and_coverage(lat, lon)
     np.testing.assert_allclose(found, bilinear(raster, lat, lon), rtol=1e-9)
     assert 0 < np.count_nonzero(inside) < 200
-    corner, on = raster.height(np.array([-42.0, -41.0]), np.array([-180.5, -179.5]))
+    corner, on = raster.heights_and_coverage(np.array([-42.0, -41.0]), np.array([-180.5, -179.5]))
     assert on.all()
     assert corner == pytest.approx([raster.height_m[0, 0], raster.height_m[-1, -1]])
 
@@ -165,7 +165,7 @@ def test_rays_through_mountains_by_brute_force(refraction):
     # Never hidden where nothing stands in it (the brute force's comb misses crests by metres);
     # missed only by less than the bound.
     assert (above[found] > -15.0).all()
-    assert (above[~found] < miss_bound_m(raster)).all()
+    assert (above[~found] < max_undetected_ground_m(raster)).all()
     # The raster's zero counts, and one by one they are what they are together.
     assert is_behind_terrain(*ends, raster, offset_m=2000.0).all()
     single = [
@@ -186,7 +186,7 @@ def hgt(folder, heights, name="S42W180.hgt"):
 def test_an_hgt_file_runs_from_north_to_south(tmp_path):
     raster = read_raster(hgt(tmp_path, [[1, 2, 3], [4, 5, 6], [7, 8, 9]], "n45E007.hgt"))
     assert (raster.south_deg, raster.west_deg, raster.lat_step_deg) == (45.0, 7.0, 0.5)
-    found, _ = raster.height(np.array([46.0, 45.0, 45.25]), np.array([7.0, 8.0, 7.5]))
+    found, _ = raster.heights_and_coverage(np.array([46.0, 45.0, 45.25]), np.array([7.0, 8.0, 7.5]))
     assert found.tolist() == [1.0, 9.0, 6.5]
     assert read_raster(hgt(tmp_path, np.zeros((2, 2)), "S05W070.hgt")).south_deg == -5.0
 
@@ -202,7 +202,7 @@ def test_tiles_side_by_side_are_one_raster():
         made = mosaic(pair)
         assert (made.height_m == whole).all() and made.name.endswith("and 1 more")
         lon = np.array([179.125, -179.875, -180.0, 180.0, -179.1])
-        found, inside = made.height(np.full(5, -41.4), lon)
+        found, inside = made.heights_and_coverage(np.full(5, -41.4), lon)
         expected = map_coordinates(whole, [np.full(5, 2.4), (lon - 179) % 360 * 4], order=1)
         assert inside.all() and found == pytest.approx(expected, rel=1e-6)
     assert mosaic(tiles[:1]) is tiles[0]
@@ -227,7 +227,7 @@ def test_a_plain_hides_what_a_sea_of_its_height_hides(refraction):
     lift = 500.0 + sag + rng.uniform(-6.0, 6.0, 500) + tilt**2 / (4.0 * sag)
     ends = (*own, lift - tilt), (*other, lift + tilt)
     low = rays_between(*ends, refraction).lowest_height_m()
-    known = np.abs(low - 500.0) > miss_bound_m(plain) + 0.001
+    known = np.abs(low - 500.0) > max_undetected_ground_m(plain) + 0.001
     hidden = is_behind_terrain(*ends, plain, refraction=refraction)
     assert (hidden == is_behind_limb(*ends, surface_m=500.0, refraction=refraction))[known].all()
     assert 100 < hidden.sum() < 400
@@ -240,10 +240,11 @@ def test_a_bent_ray_leaves_as_steeply_as_it_is_seen():
     ecef = pymap3d.enu2ecef(0.6 * level, 0.8 * level, range_m * np.sin(elevation), *own)
     other = tuple(map(np.asarray, pymap3d.ecef2geodetic(*ecef)))
     rises = [
-        (rays_between(own, other, kind).points(np.full(80, 1e-3))[2] - 200.0) / (1e-3 * range_m)
+        (rays_between(own, other, kind).points_at_shares(np.full(80, 1e-3))[2] - 200.0)
+        / (1e-3 * range_m)
         for kind in ("none", "four_thirds")
     ]
-    wanted = np.sin(bent_elevation_rad(elevation, range_m)) - np.sin(elevation)
+    wanted = np.sin(refracted_elevation_rad(elevation, range_m)) - np.sin(elevation)
     np.testing.assert_allclose(rises[1] - rises[0], wanted, rtol=0.03, atol=1e-7)
 
 
@@ -344,7 +345,9 @@ def test_a_flight_is_held_against_the_ground_where_it_is_there():
 
     def ground(first_deg):
         return SimpleNamespace(
-            name="g.tif", box=lambda: "some", height=lambda lat, _: (0.0 * lat, lat > first_deg)
+            name="g.tif",
+            bounds_text=lambda: "some",
+            heights_and_coverage=lambda lat, _: (0.0 * lat, lat > first_deg),
         )
 
     def at(times):
@@ -366,12 +369,12 @@ def test_an_ownship_that_moves_between_samples_turns_by_the_shortest_radius():
     moves_m = (6378137.0 * (1.0 - 0.00669437999014) + 1.0e4) * math.radians(1.0)
     # It may be that much lower, too: the normal turns a little faster there.
     ratio = moves_m / (6378137.0 * (1.0 - 0.00669437999014) + 2.0e4 - moves_m)
-    latitudes, heights, turns = _place(state, moves_m)
+    latitudes, heights, turns = _position_bounds(state, moves_m)
     assert turns == pytest.approx(ratio, rel=1e-12)
     assert latitudes == pytest.approx((10.0 - math.degrees(ratio), 12.0 + math.degrees(ratio)))
     assert heights == pytest.approx((2.0e4 - moves_m, 3.0e4 + moves_m))
     near = SimpleNamespace(lat_deg=np.array([-89.5, 89.5]), alt_m=np.zeros(2))
-    assert _place(near, moves_m)[0] == (-90.0, 90.0)
+    assert _position_bounds(near, moves_m)[0] == (-90.0, 90.0)
 
 
 def test_a_scene_whose_ownship_flies_into_the_ground_is_refused():

@@ -13,7 +13,7 @@ def half_a_digit(row: Row) -> float:
 def test_more_than_the_last_digit_is_said(results, item) -> None:
     for row in results[item].rows:
         if row.is_near and abs(row.difference or 0.0) > half_a_digit(row):
-            assert "allow" in row.source, row.quantity
+            assert "allow" in row.source_text, row.quantity
 
 
 def test_a_climb_that_follows_from_a_cell_says_so(results) -> None:

@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.thesis.reproduce import line, remarks, short
+from components.thesis.reproduce import footnotes, four_digit_text, markdown_table_row
 from components.thesis.rows import Made, Row, predicted
-from components.thesis.table import ITEMS, Item, chosen
+from components.thesis.table import ITEMS, Item, select_items
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from dsa_des.scene.scene import load_scene
@@ -76,21 +76,21 @@ def test_unknown_items_are_all_named(tmp_path):
     "spelling", ["fig-4.14", "Fig. 4.14", "figure 4.14", "FIG_4_14", "4.14", "fig4.14"]
 )
 def test_spellings_of_one_item(spelling):
-    assert [item.name for item in chosen([spelling])] == ["fig-4.14"]
+    assert [item.name for item in select_items([spelling])] == ["fig-4.14"]
 
 
 def test_an_item_may_cover_several_equations():
-    assert [item.name for item in chosen(["eq. 33", "eq-33-34"])] == ["eq-34"]
+    assert [item.name for item in select_items(["eq. 33", "eq-33-34"])] == ["eq-34"]
 
 
 def test_items_come_in_the_order_of_the_thesis_and_once():
-    assert [item.name for item in chosen(["fig-4.5", "fig-4.3", "Fig. 4.5"])] == [
+    assert [item.name for item in select_items(["fig-4.5", "fig-4.3", "Fig. 4.5"])] == [
         "fig-4.3",
         "fig-4.5",
     ]
-    assert chosen([]) == list(ITEMS)
+    assert select_items([]) == list(ITEMS)
     with pytest.raises(UsageError, match=r"there are several; say fig-4.3 or table-4.3"):
-        chosen(["4.3"])  # a figure and a table have this number
+        select_items(["4.3"])  # a figure and a table have this number
 
 
 def test_wrong_calls_leave_nothing_behind(tmp_path):
@@ -122,8 +122,13 @@ def test_a_row_that_cannot_be_computed_is_exit_code_1(tmp_path, monkeypatch):
 
 
 def test_short_numbers():
-    assert [short(x) for x in (0.91164, 120456.0, 1e-12, 3.0)] == ["0.9116", "120456", "1e-12", "3"]
-    assert short(0.5, sign=True) == "+0.5"
+    assert [four_digit_text(x) for x in (0.91164, 120456.0, 1e-12, 3.0)] == [
+        "0.9116",
+        "120456",
+        "1e-12",
+        "3",
+    ]
+    assert four_digit_text(0.5, sign=True) == "+0.5"
 
 
 @pytest.mark.parametrize("scene", SCENES, ids=lambda path: f"{path.parent.name}/{path.stem}")
@@ -136,12 +141,12 @@ def test_page_holds_every_row_with_its_verdict(results):
     """docs/thesis.md is what the command writes; times of a run are not compared."""
     page = (ROOT / "docs" / "thesis.md").read_text(encoding="utf-8")
     for made in results.values():
-        said = remarks(made.rows)
+        said = footnotes(made.rows)
         assert all(f"{letter} {text}" in page for text, letter in said.items())
         for row in made.rows:
             if row.unit in ("s", "1/s"):
                 continue
-            known = line(row, any(one.derived for one in made.rows), said)
+            known = markdown_table_row(row, any(one.derived for one in made.rows), said)
             # The last bits of errors near 0 are the machine's.
             assert (known if abs(row.ours) > 1e-6 else f"| {row.quantity} |") in page
         for picture in made.pictures:

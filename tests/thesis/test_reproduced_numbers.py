@@ -215,7 +215,7 @@ def test_every_row_is_computed_and_says_why(results):
         assert len(set(quantities)) == len(quantities), item
         for row in made.rows:
             assert math.isfinite(row.ours), (item, row.quantity)
-            assert row.source.endswith("."), (item, row.quantity)
+            assert row.source_text.endswith("."), (item, row.quantity)
             if row.verdict == "differs because":
                 assert len(row.because) > 20, (item, row.quantity)
 

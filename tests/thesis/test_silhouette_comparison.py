@@ -7,7 +7,7 @@ from components.optical.mesh import TriangleMesh
 from components.optical.silhouette import visible_area
 from components.thesis.silhouette_comparison import (
     AXES,
-    camera_rotation,
+    camera_angles_over_half_turn,
     compare_silhouettes,
     comparison_table,
     draw_comparison,
@@ -35,7 +35,7 @@ SIMPLE = {"front_m2": 4.0, "side_m2": 20.0, "horizontal_m2": 40.0}
 def test_camera_passes_the_stations_of_each_axis(axis, stations):
     from components.optical.silhouette import line_of_sight_in_target_axes
 
-    angle_deg, view = camera_rotation(axis)
+    angle_deg, view = camera_angles_over_half_turn(axis)
     np.testing.assert_array_equal(angle_deg, np.arange(0.0, 181.0, 10.0))
     u_x, u_y, u_z, _ = line_of_sight_in_target_axes(*view)
     for index, (azimuth, elevation) in zip((0, 9, 18), stations, strict=True):
@@ -105,8 +105,8 @@ def test_against_table_and_mesh_of_a_made_up_aircraft(synthetic_aircraft, tmp_pa
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: camera_rotation("w"), "axis is 'w'"),
-        (lambda: camera_rotation("x", 7.0), r"step_deg is 7\.0"),
+        (lambda: camera_angles_over_half_turn("w"), "axis is 'w'"),
+        (lambda: camera_angles_over_half_turn("x", 7.0), r"step_deg is 7\.0"),
         (lambda: compare_silhouettes({}, {}, scale="big"), "scale is 'big'"),
         (
             lambda: compare_silhouettes(

@@ -175,7 +175,7 @@ def test_a_prediction_shares_no_input_with_what_was_set_from_the_same_number(res
 
 def test_the_page_says_which_predictions_agree(results) -> None:
     """Of all that the thesis prints, these are what a model gave that was not told."""
-    assert {row.quantity for _, row in rows_of(results) if row.counts} == {
+    assert {row.quantity for _, row in rows_of(results) if row.is_agreeing_prediction} == {
         "Pd of the medium class at 7.31 km",
         "share of IR detections fused with the radar's",
         "simulated average, declared by 10 detections in 10 scans, medium",
@@ -211,7 +211,7 @@ def test_what_agrees_stays_wherever_its_number_stands_in_the_files(
     results, monkeypatch, item
 ) -> None:
     """Every value of ``configs`` that equals the printed number is changed."""
-    (row,) = [row for row in results[item].rows if row.counts]
+    (row,) = [row for row in results[item].rows if row.is_agreeing_prediction]
     here = float(row.printed)
 
     def swapped(value):

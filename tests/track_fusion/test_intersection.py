@@ -11,7 +11,7 @@ from components.estimation.covariance_intersection import intersect_covariances,
 from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
-from components.track_fusion.track_association import MatchRules, drop_strays, gate_share
+from components.track_fusion.track_association import MatchRules, drop_strays, gate_distance_ratio
 
 
 def covariances(seed, count):
@@ -151,7 +151,7 @@ def test_a_pair_s_distance_is_its_own_whoever_stands_beside_it():
     pairs, when = np.triu_indices(12, 1), np.full(66, 1.5)
 
     def share(one, other):
-        return gate_share(RULES, some.take(one), some.take(other), when[: len(one)])
+        return gate_distance_ratio(RULES, some.take(one), some.take(other), when[: len(one)])
 
     together = share(*pairs)
     alone = [share(*(each[[k]] for each in pairs))[0] for k in range(66)]
@@ -171,5 +171,5 @@ def test_two_directions_may_have_turned_since_the_more_the_steeper():
     first, second = (two.take(np.array([k])) for k in (0, 1))
     turned = (0.01 * 3.0) ** 2
     wanted = 0.1**2 / (2e-4 + turned / np.cos(1.2) ** 2) + 0.03**2 / (2e-4 + turned)
-    found = gate_share(RULES, first, second, np.array([4.0]))
+    found = gate_distance_ratio(RULES, first, second, np.array([4.0]))
     assert found[0] == pytest.approx(wanted / chi2.ppf(0.9, 2))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from components.messages.columns import ORIGIN, POSITION, STATE, VELOCITY
-from components.messages.state_tracks import COVARIANCE, StateTracks, full_covariance
+from components.messages.state_tracks import COVARIANCE, StateTracks, covariance_matrices
 
 
 def test_every_element_stands_where_its_column_says():
@@ -16,8 +16,8 @@ def test_every_element_stands_where_its_column_says():
     }
     assert set(columns) == set(COVARIANCE.values())
     rows = np.array([6, 0, 3])
-    np.testing.assert_array_equal(full_covariance(columns, rows), whole[..., rows])
-    np.testing.assert_array_equal(full_covariance(columns, rows, 3), whole[:3, :3, rows])
+    np.testing.assert_array_equal(covariance_matrices(columns, rows), whole[..., rows])
+    np.testing.assert_array_equal(covariance_matrices(columns, rows, 3), whole[:3, :3, rows])
 
 
 def test_groups_of_columns_are_fields_of_the_message():

@@ -87,7 +87,7 @@ def test_windows_of_a_cue_loop_are_as_long_as_its_delay(monkeypatch):
     from dsa_des.running.simulation import Simulation
     from dsa_des.running.windows import Rewinder
 
-    done = {"mark": 0, "restore": 0}
+    done = {"save_state": 0, "restore": 0}
     for name in done:
         original = getattr(Rewinder, name)
 
@@ -97,5 +97,5 @@ def test_windows_of_a_cue_loop_are_as_long_as_its_delay(monkeypatch):
 
         monkeypatch.setattr(Rewinder, name, counted)
     Simulation(dsa_des.load_scene(SCENE, duration_s="20")).run()
-    assert done["mark"] <= 42
+    assert done["save_state"] <= 42
     assert done["restore"] <= 1

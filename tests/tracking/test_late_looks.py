@@ -8,7 +8,7 @@ import pytest
 from same_runs import tables_of
 
 import dsa_des
-from components.tracking.out_of_sequence import plan_of_late, straight_plan
+from components.tracking.out_of_sequence import plan_with_late_looks, plan_without_late_looks
 from docs.make.track_consistency import (
     NEARLY,
     NOISY,
@@ -118,14 +118,14 @@ def test_a_look_as_late_as_the_lag_still_counts_and_no_later_one(rerun):
     looks = SimpleNamespace(
         tick=np.array([0, 10, 20, 10, 9]), sensors=np.array([1, 1, 1, 2, 2]), row=np.arange(5)
     )
-    plan, left_out, kept = plan_of_late(looks, np.zeros(5, dtype=int), 0, 10, rerun=rerun)
+    plan, left_out, kept = plan_with_late_looks(looks, np.zeros(5, dtype=int), 0, 10, rerun=rerun)
     assert left_out == [4] and set(plan.look.tolist()) == {0, 1, 2, 3}
     assert kept == ([1, 3, 2] if rerun else [1, 2])
 
 
 def test_where_late_looks_are_left_out_one_of_the_newest_instant_is_not_late():
     looks = SimpleNamespace(tick=np.array([20, 19, 25, 25]), row=np.arange(4))
-    plan, left_out = straight_plan(looks, np.zeros(4, dtype=int), np.array([20]))
+    plan, left_out = plan_without_late_looks(looks, np.zeros(4, dtype=int), np.array([20]))
     assert plan.look.tolist() == [0, 2, 3] and left_out == [1]
 
 

@@ -14,10 +14,10 @@ from components.messages.detections import (
     LastingError,
     LastingPart,
     SensorOffer,
-    promises_of_looks,
+    report_interval_promises,
 )
 from components.surveillance.reception import (
-    certain,
+    certain_reception_probability,
     do_365_reception_probability,
     time_to_receive_s,
 )
@@ -194,23 +194,23 @@ def test_messages_promise_what_they_do():
         do_365_reception_probability(np.array([9.0, 11.0]) * NAUTICAL_MILE_M)
     )
     assert (near, far) == pytest.approx((3.0 + 0.2, 7.0 + 0.2))
-    assert time_to_receive_s(certain(np.zeros(1))) == pytest.approx([0.7])
+    assert time_to_receive_s(certain_reception_probability(np.zeros(1))) == pytest.approx([0.7])
     assert time_to_receive_s(np.zeros(1)) == [60.0]
 
 
 def test_promises_hold_by_range():
     table = Promises((((1000.0, 2.0), (3000.0, 7.0)), ()), 10)
-    assert table.ticks(0, np.array([0.0, 1000.0, 1001.0, 9e9, np.inf])).tolist() == [
+    assert table.promised_ticks(0, np.array([0.0, 1000.0, 1001.0, 9e9, np.inf])).tolist() == [
         20, 20, 70, 70, 70
     ]  # fmt: skip
-    assert table.ticks(1, np.array([5.0])).tolist() == [0.0]
+    assert table.promised_ticks(1, np.array([5.0])).tolist() == [0.0]
 
 
 def test_who_looks_often_promises_nothing_of_its_looks():
-    assert promises_of_looks(2.0) == ()
-    assert promises_of_looks(2.5) == ((math.inf, 2.5),)
-    assert promises_of_looks(2.5, [(10.0, 1.0), (20.0, 7.0)]) == ((10.0, 2.5), (20.0, 7.0))
-    assert promises_of_looks(1.0, [(10.0, 0.6)]) == ((10.0, 0.6),)
+    assert report_interval_promises(2.0) == ()
+    assert report_interval_promises(2.5) == ((math.inf, 2.5),)
+    assert report_interval_promises(2.5, [(10.0, 1.0), (20.0, 7.0)]) == ((10.0, 2.5), (20.0, 7.0))
+    assert report_interval_promises(1.0, [(10.0, 0.6)]) == ((10.0, 0.6),)
 
 
 def test_a_miss_is_counted_once_in_the_time_that_is_promised():
@@ -271,13 +271,13 @@ def test_what_errors_of_two_looks_have_in_common_is_as_by_hand():
     assert LastingErrors.of(offers, ("nose",)) is None
     assert (
         lasting.is_correlated.tolist() == [True, True, False, True, False]
-        and lasting.sensors == 0b1011
+        and lasting.correlated_sensors_mask == 0b1011
     )
 
     def common(row, sensor, variance, since_s, moved=0.0, range_m=1000.0):
         one = np.ones((1, 1))
         sensors = np.array([[sensor]])
-        return lasting.common(
+        return lasting.covariance_with_last_errors(
             [row], sensors, variance * one, moved * one, since_s * one, range_m * one
         )[0, 0]
 

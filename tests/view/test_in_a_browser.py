@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from components.examples import folder
+from components.examples import configs_folder
 from components.view.command import view
 from tests.support.waiting import WAIT_S
 from tests.view.test_page import SCENE, luminance
@@ -19,7 +19,7 @@ PLACE = ("lat_deg", "lon_deg", "alt_m")
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory):
     out = tmp_path_factory.mktemp("watched") / "run"
-    scene = dsa_des.load_scene(folder() / "alerting" / "first_light.toml")
+    scene = dsa_des.load_scene(configs_folder() / "alerting" / "first_light.toml")
     dsa_des.run(scene, out=out)
     done = CliRunner().invoke(view, [str(out)], catch_exceptions=False)
     assert done.exit_code == 0
@@ -178,7 +178,9 @@ def test_words_stand_out_from_their_ground(browser, recorded, scheme):
 
 
 def test_each_tracker_is_shown_in_its_colour_and_by_itself(browser, tmp_path):
-    scene = dsa_des.load_scene(folder() / "tracking" / "architectures.toml", sets=["duration_s=8"])
+    scene = dsa_des.load_scene(
+        configs_folder() / "tracking" / "architectures.toml", sets=["duration_s=8"]
+    )
     dsa_des.run(scene, out=tmp_path / "run")
     assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
     opened = browser.new_page()
@@ -217,7 +219,9 @@ def test_the_beam_looks_at_a_target_when_it_lights_it(browser, tmp_path):
 
 def test_the_page_of_several_shows_what_each_has_through_its_eyes(browser, tmp_path):
     """Fields of view stand at what carries the sensors; chosen in the browser, one has the page."""
-    scene = dsa_des.load_scene(folder() / "platforms" / "one_is_blind.toml", sets=["duration_s=20"])
+    scene = dsa_des.load_scene(
+        configs_folder() / "platforms" / "one_is_blind.toml", sets=["duration_s=20"]
+    )
     dsa_des.run(scene, out=tmp_path / "run")
     assert CliRunner().invoke(view, [str(tmp_path / "run")]).exit_code == 0
     opened, wrong = browser.new_page(), []

@@ -16,7 +16,7 @@ from click.testing import CliRunner
 
 import dsa_des
 from components.display.symbols import block_marks
-from components.sensor import marks
+from components.sensor import palette
 from components.view.command import view
 
 HOSTILE = '</script><script>alert(1)</script>{{script}} & "q"'
@@ -130,9 +130,9 @@ def test_sensors_of_one_kind_differ_in_marker_and_shade():
               "ir0": "optical.ir", "ir1": "optical.ir"}  # fmt: skip
     found = block_marks(types)
     assert [found[name].colour for name in ("radar0", "eo0", "ir0")] == [
-        marks.RADAR.colour, marks.EO.colour, marks.IR.colour
+        palette.RADAR.colour, palette.EO.colour, palette.IR.colour
     ]  # fmt: skip
-    assert found["ir0"].marker == marks.IR.marker
+    assert found["ir0"].marker == palette.IR.marker
     for kind in (("radar0", "radar1", "radar2"), ("eo0", "eo1"), ("ir0", "ir1")):
         assert len({found[name].marker for name in kind}) == len(kind)
         levels = sorted(luminance(found[name].colour) for name in kind)

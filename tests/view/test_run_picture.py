@@ -11,7 +11,7 @@ import pytest
 
 from components.display.symbols import block_marks
 from components.messages.alerts import BAND_REGIONS
-from components.sensor import marks
+from components.sensor import palette
 from components.view.run_picture import encounter_picture, run_picture
 
 SCENE = """
@@ -322,7 +322,7 @@ def test_a_recorded_encounter_is_in_its_own_plane_and_time(tmp_path):
 def test_shades_of_a_kind_are_mixed_with_white_and_black():
     names = {f"r{k}": "radar.x" for k in range(4)}
     found = [block_marks(names)[name].colour for name in sorted(names)]
-    base = [int(marks.RADAR.colour[i : i + 2], 16) for i in (1, 3, 5)]
+    base = [int(palette.RADAR.colour[i : i + 2], 16) for i in (1, 3, 5)]
     linear = [((c / 255 + 0.055) / 1.055) ** 2.4 if c / 255 > 0.04045 else c / 255 / 12.92
               for c in base]  # fmt: skip
     light = 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] >= 0.25

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 import dsa_des
-from components.examples import folder
+from components.examples import configs_folder
 from components.view.command import view
 from tests.results.test_study_report import call
 from tests.results.test_study_report import folder as studied
@@ -143,7 +143,7 @@ def test_alerts_say_how_far_it_looks_and_every_aircraft_has_one_name(browser, tm
     """Alerts of a track and of the truth, by two alerting blocks; who is far is of no account."""
     run = recorded(
         tmp_path,
-        f"extends = '{folder() / 'avoidance' / 'crossing_tracked.toml'}'\n"
+        f"extends = '{configs_folder() / 'avoidance' / 'crossing_tracked.toml'}'\n"
         "[blocks.traffic.intruders.far]\neast_m = 60000\nnorth_m = 0\nspeed_mps = 60\n",
     )
     alerts = pq.read_table(run / "alerts.parquet").to_pylist()

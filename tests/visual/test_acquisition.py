@@ -7,10 +7,10 @@ import pytest
 from scipy.integrate import quad
 
 from components.visual.acquisition import (
-    acquisition_rate,
-    closing_opportunity,
-    integral_where_shown,
-    round_share,
+    acquisition_rate_per_s,
+    integrate_rate_while_shown,
+    integrated_acquisition_rate,
+    probability_met_by_round,
 )
 
 KNOT_MPS, FOOT_M, NMI_M = 1852.0 / 3600.0, 0.3048, 1852.0
@@ -18,9 +18,9 @@ KNOT_MPS, FOOT_M, NMI_M = 1852.0 / 3600.0, 0.3048, 1852.0
 
 def test_the_rate_is_solid_angle_times_beta():
     # By hand: 100 ft² at one mile; 17,000 · 100 / 6076.12² = 0.046047 1/s.
-    rate = acquisition_rate(100.0 * FOOT_M**2, NMI_M)
+    rate = acquisition_rate_per_s(100.0 * FOOT_M**2, NMI_M)
     assert rate == pytest.approx(0.0460466, rel=1e-5)
-    hazy = acquisition_rate(100.0 * FOOT_M**2, NMI_M, extinction_per_m=2.996 / (5.0 * NMI_M))
+    hazy = acquisition_rate_per_s(100.0 * FOOT_M**2, NMI_M, extinction_per_m=2.996 / (5.0 * NMI_M))
     assert hazy / rate == pytest.approx(math.exp(-2.996 / 5.0))
 
 
@@ -28,10 +28,12 @@ def test_the_rate_is_solid_angle_times_beta():
 @pytest.mark.parametrize(("from_m", "to_m"), [(9_000.0, 700.0), (math.inf, 1_300.0)])
 def test_the_closed_form_is_the_integral_of_the_rate(extinction, from_m, to_m):
     def rate(range_m):
-        return acquisition_rate(11.0, range_m, beta_per_sr_s=9_000.0, extinction_per_m=extinction)
+        return acquisition_rate_per_s(
+            11.0, range_m, beta_per_sr_s=9_000.0, extinction_per_m=extinction
+        )
 
     expected = quad(rate, to_m, from_m, epsabs=0.0, epsrel=1e-10)[0] / 120.0
-    found = closing_opportunity(
+    found = integrated_acquisition_rate(
         11.0, 120.0, from_m=from_m, to_m=to_m, beta_per_sr_s=9_000.0, extinction_per_m=extinction
     )
     assert found == pytest.approx(expected, rel=1e-8)
@@ -49,7 +51,9 @@ def test_a_search_that_comes_round_gives_the_published_table(speed_kt):
     shows_m = 40.0 * FOOT_M / math.radians(9.0 / 60.0)
     speed = speed_kt * KNOT_MPS
     for looking, published in zip((1.0, 2.0 / 3.0, 1.0 / 3.0), MORRIS[speed_kt], strict=True):
-        found = round_share(speed, from_m=shows_m, to_m=12.5 * speed, round_s=36.0, looking=looking)
+        found = probability_met_by_round(
+            speed, from_m=shows_m, to_m=12.5 * speed, round_s=36.0, looking=looking
+        )
         # "Less than" the numbers of two places, as the abstract says of an upper bound.
         assert published - 0.005 < found < published + 0.01
 
@@ -73,13 +77,13 @@ def test_stretches_begin_and_end_where_something_begins_and_ends_to_show():
         assert shown(cell, ahead_s).all(), "asked where nothing shows"
         return np.exp(ahead_s)
 
-    found = integral_where_shown(np.array([1.0, 2.0, 1.0, 0.0]), shown, rate)
+    found = integrate_rate_while_shown(np.array([1.0, 2.0, 1.0, 0.0]), shown, rate)
     expected = [math.exp(-0.2) - math.exp(-0.731), 1.0 - math.exp(-2.0), 0.0, 0.0]
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-15)
 
 
 def test_what_is_impossible_is_refused():
     with pytest.raises(ValueError, match=r"from_m is 100: it must be at least to_m, 200"):
-        closing_opportunity(1.0, 1.0, from_m=100.0, to_m=200.0)
+        integrated_acquisition_rate(1.0, 1.0, from_m=100.0, to_m=200.0)
     with pytest.raises(ValueError, match="range_m"):
-        acquisition_rate(1.0, 0.0)
+        acquisition_rate_per_s(1.0, 0.0)

@@ -8,7 +8,7 @@ from covering import covers
 from wired import chain, rows, run
 
 import dsa_des
-from components.visual.acquisition import closing_opportunity, round_share
+from components.visual.acquisition import integrated_acquisition_rate, probability_met_by_round
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, replica_scene
@@ -55,7 +55,8 @@ def test_what_happens_between_scans_adds_up_to_the_closed_form(haze_km, rate_hz)
     times = np.arange(int(35 * rate_hz)) / rate_hz
     extinction = 3.912 / (1000.0 * haze_km) if haze_km else 0.0
     expected = [
-        closing_opportunity(AREA_M2, CLOSING_MPS, from_m=FROM_M, to_m=FROM_M - CLOSING_MPS * t,
+        integrated_acquisition_rate(AREA_M2, CLOSING_MPS, from_m=FROM_M,
+        to_m=FROM_M - CLOSING_MPS * t,
                             beta_per_sr_s=9000.0, extinction_per_m=extinction)
         for t in times
     ]  # fmt: skip
@@ -83,7 +84,7 @@ def share_seen(pilot, before_s, targets=1500):
 def test_as_many_are_seen_as_the_probability_says():
     found, deviation = share_seen({"smallest_arcmin": 0.0}, before_s=12.0)
     expected = -math.expm1(
-        -closing_opportunity(AREA_M2, CLOSING_MPS, from_m=FROM_M, to_m=12.0 * CLOSING_MPS)
+        -integrated_acquisition_rate(AREA_M2, CLOSING_MPS, from_m=FROM_M, to_m=12.0 * CLOSING_MPS)
     )
     assert 0.3 < expected < 0.7
     assert abs(found - expected) < 2.6 * deviation
@@ -96,7 +97,9 @@ def test_a_search_that_comes_round_sees_the_share_of_a_round(round_s):
     pilot = {"search": "round", "round_s": round_s, "smallest_arcmin": 4.0}
     found, deviation = share_seen(pilot, before_s=8.0)
     shows_m = math.sqrt(AREA_M2 * 4.0 / math.pi) / math.radians(4.0 / 60.0)
-    expected = round_share(CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=round_s)
+    expected = probability_met_by_round(
+        CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=round_s
+    )
     assert 0.2 < expected < 0.5
     assert abs(found - expected) < 2.6 * deviation
 
@@ -157,7 +160,9 @@ def test_a_search_in_glances_comes_round_so_much_later():
     pilot = {"search": "round", "round_s": 30.0, "smallest_arcmin": 4.0, "left_looking": 0.5}
     found, deviation = share_seen(pilot, before_s=8.0, targets=600)
     shows_m = math.sqrt(AREA_M2 * 4.0 / math.pi) / math.radians(4.0 / 60.0)
-    expected = round_share(CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=60.0)
+    expected = probability_met_by_round(
+        CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=60.0
+    )
     assert 0.15 < expected < 0.3
     assert abs(found - expected) < 2.6 * deviation
 

@@ -11,7 +11,7 @@ from components.flights.sampled_flight import SampledTrajectory
 from components.geometry import enu_to_geodetic
 from components.metrics.losses import first_losses_s
 from components.metrics.separation import RelativeFlight
-from components.well_clear.plane_pairs import PairPaths, PairsInPlane, meetings
+from components.well_clear.plane_pairs import PairPaths, PairsInPlane, closest_meetings
 from dsa_des.arrays.types import FloatArray
 
 SIZES_M = ((670.56, 137.16), (152.4, 30.48))
@@ -66,7 +66,7 @@ def test_what_is_sure_is_what_the_flights_do(far_m: float, up_m: float) -> None:
     pairs = PairsInPlane(paths)
     found = ~np.isnan(first_losses_s([relative(paths, k) for k in range(80)], *SIZES_M))
     for k, limits in enumerate(SIZES_M):
-        surely, unsure = pairs.classify_inside(*limits)
+        surely, unsure = pairs.masks_surely_and_unsurely_inside(*limits)
         assert not (surely & unsure).any()
         assert surely[~unsure].tolist() == found[~unsure, k].tolist()
         assert 3 < surely.sum() < 77 and unsure.sum() < 45
@@ -87,10 +87,10 @@ def test_what_the_plane_cannot_tell_is_left_to_the_flights() -> None:
         shift = np.array(change)[:, np.newaxis, np.newaxis]
         surely, unsure = PairsInPlane(
             PairPaths(near.time_s, near.own_m + shift, near.other_m + shift)
-        ).classify_inside(*SIZES_M[0])
+        ).masks_surely_and_unsurely_inside(*SIZES_M[0])
         assert unsure.all() and not surely.any()
     one = PairPaths(near.time_s[:1], near.own_m[:, :1], near.other_m[:, :1])
-    assert PairsInPlane(one).classify_inside(*SIZES_M[0])[1].all()
+    assert PairsInPlane(one).masks_surely_and_unsurely_inside(*SIZES_M[0])[1].all()
 
 
 def straight(*pairs: tuple[tuple[float, ...], tuple[float, ...]]) -> PairPaths:
@@ -107,7 +107,9 @@ def test_the_closest_approach_lies_between_samples_and_its_angles_are_those_of_t
     head_on = ((10_000.0, 200.0, 1030.0), (-70.0, 0.0, 0.0))
     # From the right, through the ownship's place at 30 s.
     crossing = ((1500.0, 1800.0, 1000.0), (0.0, -60.0, 0.0))
-    met = meetings([(np.array([0, 1]), straight(head_on, crossing))], 3, 100.0, SIZES_M, SIZES_M)
+    met = closest_meetings(
+        [(np.array([0, 1]), straight(head_on, crossing))], 3, 100.0, SIZES_M, SIZES_M
+    )
     assert met.closest[0, :2] == pytest.approx([10_000 / 120, 30.0])
     assert met.closest[1, :2] == pytest.approx([200.0 * (1 + 1030 / 6_371_000), 0.0], abs=1e-6)
     assert met.closest[2, :2] == pytest.approx([30.0, 0.0], abs=1e-6)
@@ -117,7 +119,9 @@ def test_the_closest_approach_lies_between_samples_and_its_angles_are_those_of_t
     assert np.isnan(met.closest[:, 2]).all() and not met.unsure[:, 2].any()
     assert met.inside.tolist() == [[True, True, False], [False, True, False]]
     # A run that ends before sees only what comes until then.
-    early = meetings([(np.array([0, 1]), straight(head_on, crossing))], 2, 25.0, SIZES_M, SIZES_M)
+    early = closest_meetings(
+        [(np.array([0, 1]), straight(head_on, crossing))], 2, 25.0, SIZES_M, SIZES_M
+    )
     assert early.closest[0] == pytest.approx([25.0, 25.0])
     assert early.inside.tolist() == [[False, True], [False, False]]
 
@@ -126,12 +130,12 @@ def test_of_several_intruders_the_nearest_counts_and_events_are_anyones() -> Non
     far_below = ((1500.0, 1800.0, 1100.0), (0.0, -60.0, 0.0))
     nearer = ((10_000.0, 50.0, 1000.0), (-70.0, 0.0, 0.0))
     blocks = [(np.array([1]), straight(far_below)), (np.array([1, 0]), straight(nearer, far_below))]
-    met = meetings(blocks, 2, 100.0, SIZES_M, SIZES_M)
+    met = closest_meetings(blocks, 2, 100.0, SIZES_M, SIZES_M)
     assert met.closest[5].tolist() == pytest.approx([270.0, 180.0])
     assert met.inside.tolist() == [[True, True], [False, True]]
     assert not met.unsure_angles.any()
     twice = [(np.array([0]), straight(nearer)), (np.array([0]), straight(nearer))]
-    assert meetings(twice, 1, 100.0, SIZES_M, SIZES_M).unsure_angles.all()
+    assert closest_meetings(twice, 1, 100.0, SIZES_M, SIZES_M).unsure_angles.all()
 
 
 def test_how_a_cylinder_is_missed_beside_it_and_above_by_hand() -> None:
@@ -141,7 +145,7 @@ def test_how_a_cylinder_is_missed_beside_it_and_above_by_hand() -> None:
     above_all = ((10_000.0, 200.0, 1600.0), (-70.0, 0.0, 0.0))
     behind = ((-10_000.0, 0.0, 1000.0), (50.0, 0.0, 0.0))
     pairs = PairsInPlane(straight(descends, above_all, behind))
-    beside_m, above_m = pairs.misses_m(670.56, 30.48)
+    beside_m, above_m = pairs.least_distances_by_cylinder_m(670.56, 30.48)
     # Within 30.48 m of the same altitude until 63.05 s; within the radius from 78.0 s on.
     assert beside_m[0] == pytest.approx(np.hypot(10_000 - 120 * 63.048, 200.0) * wider, rel=1e-3)
     assert above_m[0] == pytest.approx((10_000 - np.sqrt(670.56**2 - 200**2)) / 12 - 600, abs=0.2)
@@ -155,7 +159,7 @@ def test_a_conflict_is_foreseen_a_minute_ahead_and_a_late_turn_late() -> None:
     passes = ((10_000.0, 900.0, 1030.0), (-70.0, 0.0, 0.0))
     paths = straight(head_on, passes)
     paths.other_m[1, 7:, 1] = 200.0  # it comes over between 60 and 70 s
-    met = meetings([(np.array([0, 1]), paths)], 2, 100.0, SIZES_M, SIZES_M)
+    met = closest_meetings([(np.array([0, 1]), paths)], 2, 100.0, SIZES_M, SIZES_M)
     # From 20 s on, and from when it comes over, until they are closest after 83 s.
     assert met.closest[4].tolist() == [70.0, 30.0]
 
@@ -168,9 +172,9 @@ def test_pairs_are_inside_where_closely_spaced_places_on_their_ways_are() -> Non
     apart[2, :, :60] = apart[2, :1, :60]  # level
     apart[:, :, 60:80] = apart[:, :1, 60:80]  # at rest
     own = np.zeros_like(apart)
-    surely, unsure = PairsInPlane(PairPaths(np.array([0.0, 4.0, 9.0]), own, apart)).classify_inside(
-        *limits
-    )
+    surely, unsure = PairsInPlane(
+        PairPaths(np.array([0.0, 4.0, 9.0]), own, apart)
+    ).masks_surely_and_unsurely_inside(*limits)
     share = np.linspace(0.0, 1.0, 1501)[:, None]
     inside = np.zeros(count, dtype=bool)
     for k in (0, 1):
@@ -194,5 +198,7 @@ def test_what_is_as_near_a_limit_as_the_plane_errs_is_unsure(
     place = np.array([0.6 * level_m, 0.8 * level_m, up_m])
     apart = np.repeat(place, 2).reshape(3, 2, 1)
     pairs = PairsInPlane(PairPaths(np.array([0.0, 1.0]), np.zeros_like(apart), apart))
-    said = dict(zip(("surely", "unsure"), pairs.classify_inside(500.0, 100.0), strict=True))
+    said = dict(
+        zip(("surely", "unsure"), pairs.masks_surely_and_unsurely_inside(500.0, 100.0), strict=True)
+    )
     assert {name for name, is_so in said.items() if is_so[0]} == ({found} if found else set())

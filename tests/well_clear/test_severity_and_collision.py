@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from components.well_clear.severity import (
-    altimeter_scales,
+    altimeter_error_mixture,
     collision_probability,
     laplace_difference_exceedance,
     loss_severity,
@@ -92,7 +92,7 @@ def test_a_collision_needs_a_small_miss_distance():
 
 def test_mode_c_mixes_two_altimeters():
     altitude_m = 3000 * FOOT_M
-    (good, scale), (poor, other) = altimeter_scales(altitude_m, True)
+    (good, scale), (poor, other) = altimeter_error_mixture(altitude_m, True)
     assert (good, poor) == pytest.approx((0.320, 0.680))
     assert (scale / FOOT_M, other / FOOT_M) == pytest.approx((38.0, 60.0))
     near = ([10.0], [20.0], (altitude_m, altitude_m))

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.known_targets import known_targets
+from components.aircraft.known_targets import offered_rosters
 from components.foreign.fmu.message_columns import message_column
-from components.foreign.fmu.own_pose import ownship_columns, true_lines
+from components.foreign.fmu.own_pose import ownship_columns, true_lines_of_sight
 from components.foreign.fmu.parameters import FmuParameters
 from components.foreign.fmu.units import unit_of_column
 from components.foreign.signals import Signals
@@ -32,7 +32,7 @@ _LASTS_S = 1.0 / 16.0
 
 
 class _Saved:
-    """A state in which the FMU was saved; it is given back when nobody holds it any more."""
+    """A saved state of the FMU, which is freed when nothing refers to it any more."""
 
     def __init__(self, slot: int, freed: list[int]) -> None:
         self.slot, self._freed = slot, freed
@@ -72,30 +72,32 @@ class ForeignFmu(Component):
 
     @classmethod
     def class_for(cls, parameters: Any) -> type[Component]:
-        """Return the class whose state can be saved, or not, and that sends what is asked for."""
+        """Return the class for an FMU, by whether it saves its state and sends only signals."""
         if parameters.ownship or parameters.manoeuvre or parameters.detections:
             return RewindableFmu if parameters.model.rewindable else cls
         return RewindableSignalFmu if parameters.model.rewindable else SignalFmu
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
-        """Return its clock, if what arrives does not decide."""
+        """Return the FMU's clock, or None if arriving messages decide when it communicates."""
         found: ClockSpec | None = parameters.clock_spec()
         return found
 
     def records(self) -> list[type[Message]]:
-        """Return the tables that it fills."""
+        """Return the recorded message types: signals, and manoeuvres and detections if sent."""
         sent = {Manoeuvres: self.p.manoeuvre, Detections: self.p.detections}
         return [Signals, *(kind for kind, asked in sent.items() if asked)]
 
     def request(self, port: str) -> Any:
-        """Return a request for flights where the FMU needs the ownship's velocity."""
-        if not self.p.wiring.detections.asks_for_velocity():
+        """Return a request for lines of sight if the FMU needs ownship velocity, else None."""
+        if not self.p.wiring.detections.needs_ownship_velocity():
             return None
         return Reach((-math.pi, math.pi), (-0.5 * math.pi, 0.5 * math.pi), lasts_s=_LASTS_S)
 
     def offer(self, port: str) -> Any:
-        """Offer its signals, its detections, or what the traffic offers."""
+        """Return what a port offers: the signals' units, the sensor's declaration, or for states
+        what the traffic upstream offers.
+        """
         if port == "detections":
             return self.p.wiring.detections.offer(self.p.clock_spec())
         if port == "signals":
@@ -111,7 +113,7 @@ class ForeignFmu(Component):
 
         wiring, model = self.p.wiring, self.p.model
         self._check_sources()
-        known = known_targets(self.context)
+        known = offered_rosters(self.context)
         self._roster = wiring.detections.roster(known)
         self._sees_own = bool(known)
         self._own: dict[tuple[int, str], FloatArray] = {}
@@ -160,12 +162,14 @@ class ForeignFmu(Component):
                 self.p.model.unit_conversion(offer[column], variable)
 
     def warnings(self) -> list[str]:
-        """Return a warning where communication points do not fall on the solver's steps."""
-        said = self.p.step_that_does_not_fit()
+        """Return a warning if communication points are not at whole internal steps of the FMU."""
+        said = self.p.step_mismatch_note()
         return [] if said is None else [said]
 
     def failure_counts(self) -> dict[str, tuple[int, int]]:
-        """Return how often its inputs had nothing from where they are read."""
+        """Return for each input whose source has sent nothing how often it kept its start value, of
+        how many communication points.
+        """
         found: dict[str, tuple[int, int]] = {}
         lacks = zip(self.p.wiring.sources, self._unfed.tolist(), strict=True)
         for (_, block, _, _, _, key), times in lacks if self._points else ():
@@ -186,15 +190,17 @@ class ForeignFmu(Component):
         scheduled = self.p.model.kind == "se"
         due = self._due(wake)
         if scheduled:
-            own = np.array([row for row in own if due[row] or self._waiting], dtype=np.int64)
+            own = np.array(
+                [row for row in own if due[row] or self._has_fmu_timed_clocks], dtype=np.int64
+            )
         elif self.p.clock_spec() is not None:
             own = np.flatnonzero(wake.scans >= 0)
         values, traffic = self._values(wake, own)
         seen_from = truth = None
         if self.p.detections and self._sees_own:
-            moves = wiring.detections.asks_for_velocity()
+            moves = wiring.detections.needs_ownship_velocity()
             seen_from, self._own = ownship_columns(wake, "messages", self._own, moves=moves)
-            truth = true_lines(wake, "messages", len(self._roster))
+            truth = true_lines_of_sight(wake, "messages", len(self._roster))
         if len(own) == 0:
             return None
         rows = np.ascontiguousarray(values[own])
@@ -230,11 +236,11 @@ class ForeignFmu(Component):
 
     #: Whether a scheduled FMU has a clock that it sets itself, so that every wake may be its.
     @property
-    def _waiting(self) -> bool:
+    def _has_fmu_timed_clocks(self) -> bool:
         return any(c.variability in ("countdown", "changing") for c in self.p.model.clocks.values())
 
     def _due(self, wake: Wake) -> list[list[int]]:
-        """Return the clocks that tick at each row."""
+        """Return for each row the numbers of the input clocks that tick then."""
         per_s, ticks = wake.ticks_per_s, wake.ticks
         due: list[list[int]] = [[] for _ in ticks]
         for number, clock in enumerate(self.p.model.clocks.values()):
@@ -254,7 +260,8 @@ class ForeignFmu(Component):
         return due
 
     def _values(self, wake: Wake, own: IntArray) -> tuple[FloatArray, Any]:
-        """Return the inputs at each row, and the traffic with the row that holds there.
+        """Return the input values at each row, and the traffic messages with the index of the one
+        that holds at each row.
 
         `own` are the rows that are communication points.
         """
@@ -343,7 +350,7 @@ class ForeignFmu(Component):
         return sent
 
     def _commands(self, ticks: IntArray, numbers: FloatArray) -> Manoeuvres | None:
-        """Return the commands that are new, and not to do nothing."""
+        """Return manoeuvres at the rows whose commanded values are new and not all zero."""
         how = [self.p.wiring.output_conversion(*item) for item in self.p.manoeuvre.items()]
         told = np.stack([a * numbers[:, place] + b for place, a, b in how], axis=1)
         before = np.vstack([self._told[np.newaxis], told[:-1]])
@@ -361,25 +368,25 @@ class ForeignFmu(Component):
 
 
 class RewindableFmu(ForeignFmu):
-    """An FMU whose state can be saved: it looks ahead, and is rewound if a message arrives."""
+    """A foreign FMU whose state can be saved, to run ahead and be rewound for a message."""
 
     rewindable = True
 
 
 class SignalFmu(ForeignFmu):
-    """An FMU that sends no message but its signals."""
+    """A foreign FMU that sends no messages other than its signals."""
 
     outputs = {"signals": ForeignFmu.outputs["signals"]}
 
 
 class RewindableSignalFmu(SignalFmu):
-    """The same, where its state can be saved."""
+    """A foreign FMU that sends no messages other than its signals, and whose state can be saved."""
 
     rewindable = True
 
 
 class _Shared:
-    """The numbers of states that nobody holds; it is never taken back itself."""
+    """The numbers of saved states nothing refers to; rewinding the block does not rewind it."""
 
     def __init__(self) -> None:
         self.slots: list[int] = []

@@ -13,10 +13,10 @@ import numpy as np
 
 from components.aircraft.aircraft import Aircraft, Roster
 from components.foreign.fmu.model import TEXT_KINDS, FmuModel
-from components.foreign.reported_look import TRUE_LINE, reported_looks
+from components.foreign.reported_look import TRUE_LINE, detections_of_reports
 from components.geometry import wrap_pi
 from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
-from components.messages.detections import Detections, SensorOffer, promises_of_looks
+from components.messages.detections import Detections, SensorOffer, report_interval_promises
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
@@ -33,8 +33,9 @@ _KNOWN = ("detected", *_NEEDED, "range_m", *MEASURED, *_ERRORS, "confidence", *_
 _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 
-def _outputs(value: Any, model: FmuModel) -> list[tuple[str, int | None]]:
-    """Return the variables that a value of the scene names, and which element of each.
+def _output_elements(value: Any, model: FmuModel) -> list[tuple[str, int | None]]:
+    """Return the FMU variables that a value in the scene names, each with the index of its element,
+    or None for the variable itself.
 
     Raises
     ------
@@ -42,7 +43,7 @@ def _outputs(value: Any, model: FmuModel) -> list[tuple[str, int | None]]:
         If the FMU has none of such a name.
     """
     if isinstance(value, list):
-        return [one for part in value for one in _outputs(part, model)]
+        return [one for part in value for one in _output_elements(part, model)]
     if not isinstance(value, str):
         return []
     if "*" in value and value not in model.variables:
@@ -62,12 +63,12 @@ def _outputs(value: Any, model: FmuModel) -> list[tuple[str, int | None]]:
 
 
 class _Column:
-    """Where the values of a column stand among the numbers of a row, and how they are scaled."""
+    """One detection column: which of the FMU's numbers it takes, and how they are scaled."""
 
     def __init__(self, name: str, value: Any, wiring: Any) -> None:
         places: list[int] = []
         scales: list[tuple[float, float]] = []
-        for output, element in _outputs(value, wiring.model):
+        for output, element in _output_elements(value, wiring.model):
             variable = wiring.model.variables[output]
             if variable.kind in TEXT_KINDS:
                 raise ValueError(f"{output!r} is no number")
@@ -83,14 +84,14 @@ class _Column:
         self._scale: FloatArray = np.array(scales).reshape(-1, 2).T
 
     def values(self, numbers: FloatArray) -> FloatArray:
-        """Return the column, (rows, detections), or (rows, 1) where it is the same for all."""
+        """Return the column's values, (rows, detections), or (rows, 1) if one holds for all."""
         if self.constant is not None:
             return np.full((len(numbers), 1), self.constant)
         return self._scale[0] * numbers[:, self._places] + self._scale[1]
 
 
 class DetectionOutputs:
-    """What of an FMU's outputs becomes detections, with all that is wrong about it.
+    """Which FMU outputs become detections, and a list of all that is wrong with this.
 
     Parameters
     ----------
@@ -116,9 +117,9 @@ class DetectionOutputs:
                 self.wrong.append(f"detections.{name}: {error}")
         #: How many detections a look has at most.
         self.count = max((c.size for c in self._columns.values()), default=0)
-        self._judge()
+        self._collect_problems()
 
-    def _judge(self) -> None:
+    def _collect_problems(self) -> None:
         if not self._columns and not self.wrong:
             return
         self.wrong += [
@@ -148,18 +149,18 @@ class DetectionOutputs:
         return bool(self._columns)
 
     @staticmethod
-    def variables(given: Mapping[str, Any], model: FmuModel) -> list[str]:
-        """Return the variables that are read; what is wrong about them is said elsewhere."""
+    def variable_names(given: Mapping[str, Any], model: FmuModel) -> list[str]:
+        """Return the FMU variables that detections read, without entries that name none."""
         found: list[str] = []
         for value in given.values():
             try:
-                found += [name for name, _ in _outputs(value, model)]
+                found += [name for name, _ in _output_elements(value, model)]
             except ValueError:
                 continue
         return found
 
-    def asks_for_velocity(self) -> bool:
-        """Return whether range rates need an ownship velocity that the FMU does not give."""
+    def needs_ownship_velocity(self) -> bool:
+        """Return whether range rates are read but the FMU gives no ownship velocity with them."""
         return "range_rate_m_s" in self._columns and "own_velocity_north_m_s" not in self._columns
 
     def offer(self, clock: ClockSpec | None) -> SensorOffer:
@@ -176,11 +177,12 @@ class DetectionOutputs:
             "range_m" in self._columns, math.sqrt(12.0 * max(angles)),
             "range_rate_m_s" in self._columns,
             clock=None if clock is None else lambda: clock,
-            promises=() if clock is None else promises_of_looks(float(clock.period_s)), **same,
+            promises=() if clock is None else report_interval_promises(float(clock.period_s)),
+            **same,
         )  # fmt: skip
 
     def roster(self, known: Sequence[Roster]) -> Roster:
-        """Return the targets of the scene, or those that are named here.
+        """Return the scene's roster, or else one of the names under ``targets``.
 
         Raises
         ------
@@ -200,7 +202,7 @@ class DetectionOutputs:
         self, tick: IntArray, scan: IntArray, numbers: FloatArray, own: FloatArray | None,
         truth: FloatArray | None, roster: Roster,
     ) -> Detections:  # fmt: skip
-        """Return the looks; none of a look without detection whose pose is unknown.
+        """Return rows' detections, without rows with neither a detection nor an ownship pose.
 
         Parameters
         ----------
@@ -259,7 +261,7 @@ class DetectionOutputs:
             }
         says = own is not None or "own_lat_deg" in values
         looks = {name: of_rows[name] for name in POSE} if says else {}
-        found = reported_looks(
+        found = detections_of_reports(
             tick, scan, np.concatenate(([0], np.cumsum(counts))), entries, looks,
             target, roster, **more,
         )  # fmt: skip

@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from components.aircraft.aircraft import Aircraft
-from components.embedding.host_scene import load_for_host, source_of
+from components.embedding.host_scene import load_for_host, traffic_block_name
 from components.embedding.simulator import Simulator
 from dsa_des.errors import UsageError
-from dsa_des.files.output_file import check_ending, check_file, write_file
+from dsa_des.files.output_file import check_file_ending, check_file_writable, write_file
 from dsa_des.files.toml_files import to_toml
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
@@ -78,7 +78,7 @@ _SEEN = {
 
 
 class _Variable:
-    """A variable of the FMU, and the place where its value stands."""
+    """A variable of the exported FMU, with the dictionary and the key that hold its value."""
 
     def __init__(
         self, name: str, kind: str, way: str, meaning: str, place: tuple[Any, Any]
@@ -92,7 +92,7 @@ class _Variable:
 
 
 class Chain:
-    """A scene that is called by an FMU's host.
+    """A scene's chain of sensors inside an exported FMU.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ class Chain:
         self._simulator: Simulator | None = None
 
     def variables(self) -> list[_Variable]:
-        """Return the FMU's variables: poses in, what is detected out."""
+        """Return the FMU's variables: all aircraft's poses as inputs, detections as outputs."""
         found = [
             _Variable(f"own_{key}", "float", "input", f"ownship: {meaning}", (self._own, key))
             for key, meaning in _POSE.items()
@@ -141,7 +141,7 @@ class Chain:
         return found
 
     def start(self) -> None:
-        """Build the chain."""
+        """Build the simulator with the scene's aircraft and start it."""
         self._simulator = Simulator(self._scene)
         known = self._simulator.planes
         for name, aircraft in self._planes.items():
@@ -150,7 +150,7 @@ class Chain:
         self._simulator.start()
 
     def step(self, time_s: float) -> None:
-        """Run the sensors' scans at an instant, and set the outputs from their detections."""
+        """Run the scans due at a time with the input poses; set the outputs from detections."""
         assert self._simulator is not None
         rows = [[pose[key] for key in _POSE] for pose in self._poses]
         for pose, row in zip(self._poses, rows, strict=True):
@@ -187,11 +187,11 @@ def write_chain_fmu(
             "dsa-des export-fmu needs the package pythonfmu3: pip install 'dsa-des[fmu]'"
         ) from None
     target = Path(out)
-    check_ending(target, [".fmu"])
-    check_file(target)
+    check_file_ending(target, [".fmu"])
+    check_file_writable(target)
     loaded = load_for_host(scene, sets=sets, swaps=swaps, seed=seed)
     Simulator(loaded)  # a scene that no host can drive is refused here
-    planes = _planes_of(loaded)
+    planes = _aircraft_by_name(loaded)
     said = {"title": loaded.title or loaded.path.stem, "planes": planes}
     with tempfile.TemporaryDirectory(prefix="dsa_des_export_") as folder:
         place = Path(folder)
@@ -208,9 +208,9 @@ def write_chain_fmu(
     say(f"{target}: {len(planes)} planes ({', '.join(planes)})")
 
 
-def _planes_of(scene: Scene) -> dict[str, Any]:
-    """Return the aircraft of a scene by name, as `Simulator.add_plane` takes them."""
-    traffic: Any = Simulation(scene).components[source_of(scene)]
+def _aircraft_by_name(scene: Scene) -> dict[str, Any]:
+    """Return each aircraft's properties by name, as `Simulator.add_plane` takes them."""
+    traffic: Any = Simulation(scene).components[traffic_block_name(scene)]
     roster = traffic.roster
     return {
         name: aircraft.model_dump(

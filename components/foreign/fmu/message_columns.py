@@ -11,7 +11,7 @@ from dsa_des.errors import did_you_mean
 
 
 def message_column(message: Any, column: str, which: str | None, key: str) -> FloatArray:
-    """Return a value for each row of a message; NaN where it has none.
+    """Return the value of a column in each row of a message; NaN where a row has none.
 
     Parameters
     ----------
@@ -29,8 +29,10 @@ def message_column(message: Any, column: str, which: str | None, key: str) -> Fl
         If there is no such column or target, or it has more than one value for each row.
     """
     if isinstance(message, Signals):
-        return _signal(message, column, which, key)
-    known = [item.name for item in fields(message) if _is_numbers(getattr(message, item.name))]
+        return _signal_column(message, column, which, key)
+    known = [
+        item.name for item in fields(message) if _is_numeric_array(getattr(message, item.name))
+    ]
     if column not in known:
         raise ValueError(
             f"{key}: {type(message).__name__} has no column {column!r}{did_you_mean(column, known)}"
@@ -62,7 +64,7 @@ def message_column(message: Any, column: str, which: str | None, key: str) -> Fl
     return found
 
 
-def _is_numbers(value: Any) -> bool:
+def _is_numeric_array(value: Any) -> bool:
     return isinstance(value, np.ndarray) and value.dtype.kind in "biuf"
 
 
@@ -71,7 +73,7 @@ def _is_per_entry(message: Any, column: str) -> bool:
     return found.metadata.get("per") == "entry"
 
 
-def _signal(message: Signals, column: str, which: str | None, key: str) -> FloatArray:
+def _signal_column(message: Signals, column: str, which: str | None, key: str) -> FloatArray:
     if column not in message.names:
         raise ValueError(
             f"{key}: there is no signal {column!r}{did_you_mean(column, message.names)}"

@@ -12,7 +12,7 @@ from typing import Any
 
 from components.foreign.fmu.units import Scale, scale_of
 from dsa_des.errors import did_you_mean
-from dsa_des.files.input_files import cache_reads
+from dsa_des.files.input_files import cache_file_reads
 
 _KINDS = {"Real": "Float64", "Integer": "Int32"}
 #: Kinds whose values are no numbers.
@@ -52,8 +52,8 @@ class Variable:
     alias: bool = False
     items: tuple[tuple[str, int], ...] = ()
 
-    def item(self, name: str) -> int:
-        """Return what a name of an enumeration stands for; ValueError names the nearest."""
+    def enumeration_value(self, name: str) -> int:
+        """Return an enumeration item's integer by name; else ValueError with the nearest name."""
         known = dict(self.items)
         if name not in known:
             raise ValueError(
@@ -65,7 +65,7 @@ class Variable:
 
 @dataclass(frozen=True)
 class PartitionClock:
-    """An input clock, of FMI 3; `interval_s` is None where it varies."""
+    """An input clock of an FMI 3 model; ``interval_s`` is None where the interval varies."""
 
     name: str
     reference: int
@@ -78,7 +78,7 @@ class PartitionClock:
 
 @dataclass(frozen=True, eq=False)
 class FmuModel:
-    """What an FMU says of itself.
+    """The content of an FMU's model description.
 
     Parameters
     ----------
@@ -112,7 +112,9 @@ class FmuModel:
     terminals: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def variable(self, name: str, allowed: str = "") -> Variable:
-        """Return a variable by its name; ValueError names the nearest."""
+        """Return the variable of that name, of the ``allowed`` causality if one is given;
+        ValueError, with the nearest name, if there is none.
+        """
         names = [v.name for v in self.variables.values() if allowed in ("", v.causality)]
         if name not in names:
             what = f"{allowed} variable" if allowed else "variable"
@@ -140,7 +142,7 @@ class FmuModel:
         return known.factor / to.factor, (known.offset - to.offset) / to.factor
 
 
-@cache_reads(64)
+@cache_file_reads(64)
 def read_fmu(path: Path) -> FmuModel:
     """Return the model description of an FMU.
 
@@ -252,11 +254,11 @@ def _variable(v: Any, version: int, everything: Any) -> Variable:
     return Variable(
         v.name, v.unit or declared or "", v.valueReference, kind, v.causality or "local",
         v.variability or usual, dimensions, v.start, settable and v.variability != "constant",
-        v.alias is not None, _items(v),
+        v.alias is not None, _enumeration_items(v),
     )  # fmt: skip
 
 
-def _items(v: Any) -> tuple[tuple[str, int], ...]:
+def _enumeration_items(v: Any) -> tuple[tuple[str, int], ...]:
     items = (v.declaredType.items if v.type == "Enumeration" and v.declaredType else None) or ()
     return tuple((item.name, int(item.value)) for item in items)
 
@@ -292,7 +294,7 @@ def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, PartitionClock], dict[s
 
 
 def _terminals(archive: zipfile.ZipFile, names: list[str]) -> dict[str, dict[str, str]]:
-    """Return the variables of each terminal, by the names of the members."""
+    """Return for each terminal of the FMU the names of its variables by member name."""
     name = "terminalsAndIcons/terminalsAndIcons.xml"
     if name not in names:
         return {}

@@ -16,7 +16,7 @@ _LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
 def ownship_columns(
     wake: Wake, port: str, held: dict[tuple[int, str], FloatArray], *, moves: bool
 ) -> tuple[FloatArray, dict[tuple[int, str], FloatArray]]:
-    """Return the ownship at each row of a wake, and what is held of each source from now on.
+    """Return the ownship's pose and velocity at a wake's rows, and sources' latest for the next.
 
     What a line of sight was made with (the belief) goes before the traffic's truth.
 
@@ -56,7 +56,7 @@ def ownship_columns(
 
 
 def _pose_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
-    """Return pose and velocity of each row of a message, (9, rows)."""
+    """Return the pose and velocity (9, rows) that a message's rows state; NaN where none."""
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
     if isinstance(message, TrafficStates):
@@ -65,14 +65,14 @@ def _pose_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
     if message.believed is not None:
         found[: len(POSE)] = [message.believed[name] for name in POSE_FIELDS]
     if moves:
-        state: IntArray = message.picture_tick
+        state: IntArray = message.position_ticks
         time_s = state / wake.ticks_per_s
         found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
     return found
 
 
-def true_lines(wake: Wake, port: str, targets: int) -> FloatArray:
-    """Return where targets truly are, (3, rows, targets); NaN where no line of sight came then.
+def true_lines_of_sight(wake: Wake, port: str, targets: int) -> FloatArray:
+    """Return true lines of sight, (3, rows, targets); NaN if none came at the row's instant.
 
     Azimuth and elevation in the ownship's body axes, and range.
     """

@@ -96,7 +96,7 @@ class FmuParameters(Parameters):
         except ValueError as error:
             raise Disagreements([f"file: {error}"]) from error
         wiring = Wiring(self)
-        Disagreements.refuse(wiring.wrong)
+        Disagreements.raise_if_any(wiring.wrong)
         self._wiring = wiring
         return self
 
@@ -119,14 +119,16 @@ class FmuParameters(Parameters):
         return None
 
     def _own_step_s(self) -> Fraction:
-        """Return the FMU's own step: of its experiment, if that is whole steps of its solver."""
+        """Return the FMU's own step (s): that of its default experiment if it is whole solver
+        steps, else the solver's, or 0.01 s.
+        """
         step, inside = self.model.step_s, self.model.internal_step_s
         if inside and (not step or (step / inside).denominator != 1):
             return inside
         return step or Fraction(1, 100)
 
-    def step_that_does_not_fit(self) -> str | None:
-        """Return a sentence if communication points are no whole steps of the FMU's own."""
+    def step_mismatch_note(self) -> str | None:
+        """Return a note if communication points are not at whole internal FMU steps, else None."""
         inside = self.model.internal_step_s
         if inside and self.scan_rate_hz is not None:
             steps = 1 / (self.scan_rate_hz * inside)
@@ -140,7 +142,7 @@ class FmuParameters(Parameters):
 
 
 def _common_step(instants: Sequence[Fraction]) -> Fraction:
-    """Return the largest step of which all instants are multiples."""
+    """Return the largest step (s) of which all given times are whole multiples."""
     step = Fraction(0)
     for instant in instants:
         denominator = math.lcm(step.denominator, instant.denominator)

@@ -66,7 +66,7 @@ class FmuProcess:
         self.close = child.end
 
     def open(self, spec: dict[str, Any], deadline_s: float) -> int:
-        """Make an instance; return its number."""
+        """Create an instance of the FMU in the process and return its number."""
         self._count += 1
         self.ask({"do": "open", "instance": self._count, "spec": spec}, max(deadline_s, 10.0))
         return self._count
@@ -131,7 +131,7 @@ class FmuProcess:
 
 
 class _Watch:
-    """Kills a process that makes no communication point for too long."""
+    """Kills an FMU's process that reaches no communication point for longer than its deadline."""
 
     _thread: threading.Thread | None = None
     _all: "set[_Watch]" = set()
@@ -156,10 +156,10 @@ class _Watch:
         while True:
             time.sleep(_LOOK_S)
             for watch in list(cls._all):
-                watch.look()
+                watch.kill_if_late()
 
-    def look(self) -> None:
-        """Kill the process if it is late."""
+    def kill_if_late(self) -> None:
+        """Kill the process if it has reached no communication point within its deadline."""
         beat, now = int(self._beat[0]), time.monotonic()
         if beat != self._seen:
             self._seen, self._since = beat, now
@@ -182,7 +182,7 @@ _RUNNING: "WeakValueDictionary[tuple[str, int, int], FmuProcess]" = WeakValueDic
 
 
 def process_for(path: Path, *, alone: bool) -> FmuProcess:
-    """Return the process in which instances of an FMU run, a new one where each needs its own."""
+    """Return the process for an FMU's instances: a shared one, or a new one if ``alone``."""
     state = path.stat()
     key = str(path), state.st_mtime_ns, os.getpid()
     found = None if alone else _RUNNING.get(key)

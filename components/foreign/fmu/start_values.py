@@ -20,8 +20,8 @@ class StartValue(NamedTuple):
     structural: bool
 
 
-def size_of(model: FmuModel, start: Mapping[str, Any], variable: Variable) -> int:
-    """Return how many values a variable has, given what the scene starts with.
+def value_count(model: FmuModel, start: Mapping[str, Any], variable: Variable) -> int:
+    """Return a variable's number of values; array sizes are those the scene sets at the start.
 
     Raises
     ------
@@ -40,7 +40,7 @@ def size_of(model: FmuModel, start: Mapping[str, Any], variable: Variable) -> in
 
 
 def start_value(model: FmuModel, start: Mapping[str, Any], name: str) -> StartValue:
-    """Return one of the start values, in the variable's type and unit.
+    """Return a variable's start value from the scene, converted to its type and unit.
 
     Raises
     ------
@@ -50,7 +50,7 @@ def start_value(model: FmuModel, start: Mapping[str, Any], name: str) -> StartVa
     variable = model.variable(name)
     if not variable.settable:
         raise ValueError(f"{name!r} is a {variable.causality} of which no start is given")
-    size, values = size_of(model, start, variable), _flat(start[name])
+    size, values = value_count(model, start, variable), _flat(start[name])
     if len(values) != size:
         raise ValueError(f"{name!r} has {len(values)} values where it needs {size}")
     structural = variable.causality == "structuralParameter"
@@ -59,8 +59,8 @@ def start_value(model: FmuModel, start: Mapping[str, Any], name: str) -> StartVa
 
 
 def first_inputs(model: FmuModel, start: Mapping[str, Any], variable: Variable) -> list[float]:
-    """Return an input's first value: the scene's start value, or the FMU's own."""
-    size = size_of(model, start, variable)
+    """Return an input's first values: those the scene sets at the start, or else the FMU's."""
+    size = value_count(model, start, variable)
     if variable.name in start:
         return [float(value) for value in start_value(model, start, variable.name).values]
     numbers = [_number(word) for word in (variable.start or "").split()]
@@ -92,7 +92,7 @@ def _convert_value(model: FmuModel, variable: Variable, value: Any) -> Any:
             return float(value)
         raise ValueError(f"{said}: a number is needed")
     if isinstance(value, str) and variable.items:
-        return variable.item(value)
+        return variable.enumeration_value(value)
     if isinstance(value, bool) or not isinstance(value, int):
         raise ValueError(f"{said}: a whole number is needed")
     bounds = np.iinfo(kind.lower())

@@ -39,7 +39,7 @@ class Scale:
 
 
 def scale_of(unit: str) -> Scale | None:
-    """Return one of our units; None where it is none of them."""
+    """Return the `Scale` of one of the units used here, or None for any other unit."""
     named = unit.replace("²", "2").replace("^", "")
     if named not in _UNITS:
         return None

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 from components.foreign.fmu.detections import DetectionOutputs
 from components.foreign.fmu.model import TEXT_KINDS, FmuModel, PartitionClock, Variable
-from components.foreign.fmu.start_values import first_inputs, size_of, start_value
+from components.foreign.fmu.start_values import first_inputs, start_value, value_count
 from components.foreign.fmu.units import unit_of_column
 from components.messages.steering import Manoeuvres
 from dsa_des.errors import did_you_mean
@@ -22,7 +22,7 @@ _ELEMENT = re.compile(r"(?P<name>.*)\[(?P<place>\d+)\]")
 
 
 class Source(NamedTuple):
-    """Where one value among the inputs comes from."""
+    """Where an FMU's input value comes from: the block, its column, and which of its values."""
 
     place: int
     block: str
@@ -33,7 +33,7 @@ class Source(NamedTuple):
 
 
 class Wiring:
-    """How the variables of an FMU are read and set, with all that is wrong about it.
+    """Which FMU variables are read and set, to and from which columns, and all that is wrong.
 
     Parameters
     ----------
@@ -53,8 +53,11 @@ class Wiring:
         self._read_outputs()
         self._read_inputs()
         self._read_clocks()
-        for key, known in (("ownship", _OWNSHIP), ("manoeuvre", Manoeuvres.parts())):
-            self._read_fields(key, getattr(p, key), known)
+        for key, known in (
+            ("ownship", _OWNSHIP),
+            ("manoeuvre", Manoeuvres.manoeuvre_field_names()),
+        ):
+            self._check_fields(key, getattr(p, key), known)
         self.detections = DetectionOutputs(p.detections, p.targets, self)
         self.wrong += self.detections.wrong
         if self.model.kind == "se" and p.scan_rate_hz is not None:
@@ -64,7 +67,7 @@ class Wiring:
 
     def size(self, variable: Variable) -> int:
         """Return how many values a variable has."""
-        return size_of(self.model, self.p.start, variable)
+        return value_count(self.model, self.p.start, variable)
 
     # -- outputs -------------------------------------------------------------------------------
 
@@ -80,7 +83,7 @@ class Wiring:
         else:
             raised = [name for name in names if name in raised]
             names = [name for name in names if name not in raised]
-        detected = DetectionOutputs.variables(self.p.detections, self.model)
+        detected = DetectionOutputs.variable_names(self.p.detections, self.model)
         for extra in (*self.p.ownship.values(), *self.p.manoeuvre.values(), *detected):
             if extra not in names:
                 names = [*names, extra]
@@ -94,7 +97,7 @@ class Wiring:
                 continue
             groups.setdefault(variable.kind, []).append(variable)
         ordered = sorted(groups, key=lambda kind: kind in TEXT_KINDS)
-        self.outputs = [(kind, self._value_ranges(groups[kind])) for kind in ordered]
+        self.outputs = [(kind, self._references_and_sizes(groups[kind])) for kind in ordered]
         variables = [variable for kind in ordered for variable in groups[kind]]
         self.names = tuple([v.name for v in variables] + raised)
         self.units = tuple([v.unit for v in variables] + [""] * len(raised))
@@ -109,10 +112,10 @@ class Wiring:
             self.number_count += size if variable.kind not in TEXT_KINDS else 0
         self.layout += [(len(variables) + i, 0) for i in range(len(raised))]
 
-    def _value_ranges(self, variables: Sequence[Variable]) -> list[tuple[int, int]]:
+    def _references_and_sizes(self, variables: Sequence[Variable]) -> list[tuple[int, int]]:
         return [(variable.reference, self.size(variable)) for variable in variables]
 
-    def _read_fields(self, key: str, given: Mapping[str, str], known: Sequence[str]) -> None:
+    def _check_fields(self, key: str, given: Mapping[str, str], known: Sequence[str]) -> None:
         for name, output in given.items():
             if name not in known:
                 self.wrong.append(f"{key}: there is no {name!r}{did_you_mean(name, known)}")
@@ -126,8 +129,8 @@ class Wiring:
                     self.wrong.append(f"{key}.{name}: {error}")
 
     def output_conversion(self, name: str, output: str) -> tuple[int, float, float]:
-        """Return an output's index among the numbers, and scale and offset into a column: (index,
-        a, b).
+        """Return (index, a, b): an output's index among the FMU's numbers, and the factors by which
+        a number x is the column's a x + b.
         """
         code = self.names.index(output)
         place = next(i for i, (signal, _) in enumerate(self.layout) if signal == code)
@@ -157,7 +160,7 @@ class Wiring:
             if variable not in group:
                 group.append(variable)
             parsed.append((variable, place, source))
-        self.inputs = [(kind, self._value_ranges(groups[kind])) for kind in groups]
+        self.inputs = [(kind, self._references_and_sizes(groups[kind])) for kind in groups]
         first, self.defaults = dict[str, int](), list[float]()
         for kind in groups:
             for variable in groups[kind]:
@@ -180,7 +183,7 @@ class Wiring:
         )
 
     def _expand_targets(self, given: Mapping[str, str]) -> list[tuple[str, str]]:
-        """Return the inputs with their sources; one of ``BLOCK.COLUMN[*]`` is one of each target.
+        """Return pairs of input and source, with ``BLOCK.COLUMN[*]`` as one for each target.
 
         Of an array these are its elements, of ``plane[*].range`` the inputs of that number.
         """
@@ -256,7 +259,7 @@ class Wiring:
     # -- what the FMU's process needs to know --------------------------------------------------
 
     def spec(self, name: str, ticks_per_s: int, *, rewinds: bool) -> dict[str, Any]:
-        """Return the specification of the wiring for the FMU's process.
+        """Return the description of all reads and writes that the FMU's process needs.
 
         Raises
         ------
@@ -269,11 +272,11 @@ class Wiring:
             "token": model.token, "name": name, "events": model.events, "rewinds": rewinds,
             "discrete": self.discrete, "start": [tuple(one) for one in self.starts],
             "inputs": self.inputs, "outputs": self.outputs, "raised": self.raised,
-            "clocks": [self._clock(clock, ticks_per_s) for clock in model.clocks.values()],
+            "clocks": [self._clock_spec(clock, ticks_per_s) for clock in model.clocks.values()],
         }  # fmt: skip
 
-    def _clock(self, clock: PartitionClock, ticks_per_s: int) -> dict[str, Any]:
-        """Return when a clock ticks; clocks of scheduled FMUs get their ticks at every wake."""
+    def _clock_spec(self, clock: PartitionClock, ticks_per_s: int) -> dict[str, Any]:
+        """Return when a clock ticks; a scheduled FMU's clocks are told to tick at every wake."""
         interval, shift = Fraction(0), Fraction(0)
         given = self.p.clocks.get(clock.name)
         times: list[Fraction] = []

@@ -29,7 +29,7 @@ _OTHERS = ("vehicle_local_position", "vehicle_attitude", "transponder_report")
 
 
 def ulog_log(problems: Problems, data: bytes, stem: str) -> Log:
-    """Return the flight of a PX4 log, and the aircraft that its receiver reported.
+    """Return a PX4 log's flight of the vehicle and of the aircraft its receiver reported.
 
     Times are UTC where GNSS said it, else those since the start. The own heights are above mean sea
     level; of the others they are pressure altitudes where they are said to be.
@@ -50,8 +50,8 @@ def ulog_log(problems: Problems, data: bytes, stem: str) -> Log:
     return Log("a PX4 log (ULog)", "m and m/s", each(), callsigns, "samples", warnings, ABOVE_SEA)
 
 
-def _utc_less_boot_s(topics: Mapping[str, Topic]) -> float:
-    """Return what GNSS says that the start was in UTC; 0 where it did not say."""
+def _boot_time_utc_s(topics: Mapping[str, Topic]) -> float:
+    """Return the autopilot's start in UTC (s since 1970) by its GNSS receiver; 0 if unknown."""
     for name in _POSITIONS[1:]:
         gps = topics.get(name, {})
         if "time_utc_usec" in gps:
@@ -76,7 +76,7 @@ _AT_ONCE = 8192
 
 
 def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[PositionReport]:
-    utc_less_boot_s = _utc_less_boot_s(topics)
+    utc_less_boot_s = _boot_time_utc_s(topics)
     for first in range(0, len(topics[name]["timestamp"]), _AT_ONCE):
         block = slice(first, first + _AT_ONCE)
         own = {key: np.asarray(values[block], float) for key, values in topics[name].items()}
@@ -94,7 +94,7 @@ def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[
             yield PositionReport(stem, time_s, lat_deg, lon_deg, alt_m, None, *others)
 
 
-def _latest_values(times_s: FloatArray, values: AnyArray, wanted_s: FloatArray) -> FloatArray:
+def _interpolated_values(times_s: FloatArray, values: AnyArray, wanted_s: FloatArray) -> FloatArray:
     return np.interp(wanted_s, times_s, np.asarray(values, float))
 
 
@@ -110,7 +110,7 @@ def _velocity(
     elif len(local.get("timestamp", ())) and "vx" in local:
         known_s = np.asarray(local["timestamp"], float) / 1e6
         north, east, down = (
-            _latest_values(known_s, local[key], boot_s) for key in ("vx", "vy", "vz")
+            _interpolated_values(known_s, local[key], boot_s) for key in ("vx", "vy", "vz")
         )
     else:
         return [np.full(len(boot_s), np.nan)] * 3
@@ -137,7 +137,7 @@ def _reports_heard_by_px4(
     heard = topics.get("transponder_report", {})
     if not len(heard.get("timestamp", ())):
         return
-    offset_s = _utc_less_boot_s(topics)
+    offset_s = _boot_time_utc_s(topics)
     keys = (
         "timestamp", "icao_address", "lat", "lon", "altitude_type", "altitude", "heading",
         "hor_velocity", "ver_velocity", "flags", "tslc",
@@ -158,7 +158,7 @@ def _transponder_report(
     callsigns: dict[str, str], address: int, callsign: str, time_s: float, lat: float, lon: float,
     kind: float, alt: float, heading: float, fast: float, climb: float, flags: int,
 ) -> PositionReport:  # fmt: skip
-    """Return a report that an autopilot's receiver made; units are degrees, m, m/s."""
+    """Return a report of an aircraft the autopilot's receiver heard; in degrees, m and m/s."""
     name = f"{address:06x}"
     if flags & _CALLSIGN and callsign.strip("\0 "):
         callsigns[name] = callsign.strip("\0 ")
@@ -206,7 +206,7 @@ def is_tlog(data: bytes) -> bool:
 
 
 def _end_of_frame(data: bytes, at: int) -> int | None:
-    """Return where a frame that begins with its time ends; None where there is none."""
+    """Return the index after the frame at ``at`` with its time; None if no frame begins there."""
     if at + _STAMP + 3 > len(data) or data[at + _STAMP] not in (_V1, _V2):
         return None
     stamp = int.from_bytes(data[at : at + _STAMP], "big")
@@ -220,7 +220,7 @@ def _end_of_frame(data: bytes, at: int) -> int | None:
 
 
 def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
-    """Return the flights of the vehicles in a tlog, and of the aircraft they received.
+    """Return a log of the vehicles' flights in a tlog, and of the aircraft they received.
 
     Times are those of the ground station. Heights of vehicles are above mean sea level.
     """

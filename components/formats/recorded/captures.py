@@ -33,13 +33,13 @@ def is_capture(data: bytes) -> bool:
 
 
 def udp_payloads(problems: Problems, data: bytes) -> list[tuple[float, bytes]]:
-    """Return when each datagram was captured, and what it holds; TrafficFileError if none."""
+    """Return a capture's UDP datagrams, each its time (s) and content; TrafficFileError if none."""
     problems.of = "packet"
     packets = _read_pcap(problems, data) if data[:4] in _PCAP else _read_pcapng(problems, data)
     found, links = [], set()
     for packet in packets:
         links.add(packet.link)
-        payload = _udp(packet)
+        payload = _udp_payload(packet)
         if payload:
             found.append((packet.time_s, payload))
     if not found:
@@ -87,7 +87,9 @@ def _read_pcapng(problems: Problems, data: bytes) -> Iterator[Packet]:
         at += size
         try:
             if kind == _INTERFACE:
-                interfaces.append((struct.unpack(f"{order}H", body[:2])[0], _tick_s(body, order)))
+                interfaces.append(
+                    (struct.unpack(f"{order}H", body[:2])[0], _time_resolution_s(body, order))
+                )
             elif kind == _ENHANCED:
                 which, high, low, kept = struct.unpack(f"{order}4I", body[:16])
                 link, tick_s = interfaces[which]
@@ -98,8 +100,8 @@ def _read_pcapng(problems: Problems, data: bytes) -> Iterator[Packet]:
             problems.fail("the block is damaged", line=number)
 
 
-def _tick_s(body: bytes, order: str) -> float:
-    """Return what a count of an interface's times is worth, from its options."""
+def _time_resolution_s(body: bytes, order: str) -> float:
+    """Return the unit (s) in which an interface's times are counted, from its options."""
     at = 8
     while at + 4 <= len(body):
         code, size = struct.unpack(f"{order}2H", body[at : at + 4])
@@ -112,8 +114,8 @@ def _tick_s(body: bytes, order: str) -> float:
     return 1e-6
 
 
-def _udp(packet: Packet) -> bytes | None:
-    """Return what a packet holds over UDP and IP, None where it is something else, or a part."""
+def _udp_payload(packet: Packet) -> bytes | None:
+    """Return the content of a packet's UDP datagram; None if it is other or only a fragment."""
     data = packet.content
     if packet.link not in _LINKS:
         return None

@@ -12,7 +12,7 @@ from components.geometry import line_of_sight_ned
 
 
 def recorded_tracks(path: Path, at: tuple[float, float] | None = None) -> Tracks:
-    """Return the tracks of a file of recorded aircraft, the first aircraft's first.
+    """Return the tracks of the aircraft in a recorded file, in the file's order.
 
     They are in the plane that touches at the origin, by default where the first sample is. Times
     are the file's own. EncounterSetError says what is wrong with it.
@@ -29,5 +29,5 @@ def recorded_tracks(path: Path, at: tuple[float, float] | None = None) -> Tracks
         lat, lon = columns["lat"], columns["lon"]
         north, east, _ = line_of_sight_ned(*origin, 0.0, lat, lon, np.zeros_like(lat))
         tracks.append((columns["time"], north, east, columns["alt"]))
-    recording.notes.settle()
+    recording.notes.summarize_aircraft_notes()
     return tracks, origin, [f"{path}: {note}" for note in recording.notes.warnings]

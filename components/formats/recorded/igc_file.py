@@ -26,7 +26,7 @@ def is_igc(head: bytes) -> bool:
 
 
 def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
-    """Return the flight of an IGC file: pressure altitude, GNSS altitude above the ellipsoid."""
+    """Return a log of an IGC file's flight, with pressure and GNSS (ellipsoid) altitudes."""
     text = text_of(data, problems)
     warnings: list[str] = []
     fixes = _fixes(problems, text, _name(text) or stem, warnings)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 from itertools import chain
 from typing import Any
 
-from components.formats.csv_file import known_among, record_rows
+from components.formats.csv_file import count_known_columns, recording_of_rows
 from components.formats.receiver_logs import UNKNOWN_JSON, json_documents
 from components.formats.recording import Recording
 from components.formats.sample_columns import Altitude
@@ -28,7 +28,7 @@ def record_json(
     records = _records(problems, data, warnings)
     del data
     begins, first = next(records, (1, None))
-    if first is None or known_among(map(str, first)) < _FEWEST:
+    if first is None or count_known_columns(map(str, first)) < _FEWEST:
         problems.fail(UNKNOWN_JSON)
     headers = [str(key) for key in first]
     keys = list(headers)
@@ -43,7 +43,7 @@ def record_json(
                 ],
             )
 
-    recording = record_rows(
+    recording = recording_of_rows(
         problems, headers, 1, rows(), ownship, altitude, stem, kind="records in JSON"
     )
     recording.notes.warnings += warnings
@@ -65,7 +65,7 @@ def _records(
 
 
 def _rows_of(document: Any) -> Iterable[Any]:
-    """Return the records of a document: one, or columns as pandas writes them."""
+    """Return a JSON document's records: itself, or the rows of a table pandas wrote by columns."""
     if isinstance(document, dict):
         columns, rows = document.get("columns"), document.get("data")
         if columns is not None and isinstance(rows, Iterable):

@@ -6,11 +6,11 @@ import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 
-from components.formats.asterix_file import record_asterix
+from components.formats.asterix_file import recording_of_asterix
 from components.formats.asterix_records import read_records
-from components.formats.csv_file import record_rows, record_table
-from components.formats.daa_file import record_daa
-from components.formats.receiver_logs import log_of
+from components.formats.csv_file import recording_of_rows, recording_of_table
+from components.formats.daa_file import recording_of_daa
+from components.formats.receiver_logs import parse_receiver_log
 from components.formats.recorded import ulog_file
 from components.formats.recorded.autopilot_logs import is_tlog, tlog_log, ulog_log
 from components.formats.recorded.captures import is_capture, udp_payloads
@@ -61,7 +61,7 @@ def record(
     altitude: Altitude | None = None,
     place: tuple[float, float, float] | None = None,
 ) -> Recording:
-    """Return the aircraft of a file of any known kind.
+    """Return a `Recording` of the aircraft in a file of any known format.
 
     Parameters
     ----------
@@ -86,7 +86,7 @@ def record(
     if is_capture(data):
         return _read_capture(problems, data, altitude, place)
     if path.suffix.lower() == ".ast" or _is_asterix(data):
-        return record_asterix(problems, data, altitude, place=place)
+        return recording_of_asterix(problems, data, altitude, place=place)
     log = _log_of(problems, data, stem)
     if log is not None:
         del data  # its reader holds what it needs of it
@@ -100,9 +100,9 @@ def record(
     lines, is_daa = iterate_lines(text), _is_daa(text)
     del data, text  # the lines hold it while there are more
     if path.suffix.lower() in (".daa", ".xyz") or is_daa:
-        return record_daa(problems, lines, place or (0.0, 0.0, 0.0))
+        return recording_of_daa(problems, lines, place or (0.0, 0.0, 0.0))
     try:
-        return record_table(problems, lines, None, altitude, stem)
+        return recording_of_table(problems, lines, None, altitude, stem)
     except TrafficFileError as error:
         if sum("there is no column" in problem for problem in error.problems) < _LACKING:
             raise
@@ -125,7 +125,7 @@ def _log_of(problems: Problems, data: bytes, stem: str) -> Log | None:
         if tracks is None:
             problems.fail(f"is XML, but neither GPX nor KML; what is read: {KINDS}")
         return tracks
-    return log_of(problems, data)
+    return parse_receiver_log(problems, data)
 
 
 def _unzip(problems: Problems, data: bytes) -> bytes:
@@ -168,15 +168,16 @@ def captured_asterix(path: Path) -> bytes | None:
     if path.suffix.lower() not in _CAPTURES:
         return None
     problems = Problems(str(path))
-    _, blocks, _ = _blocks_of(problems, read_content(path, problems))
+    _, blocks, _ = _asterix_of_capture(problems, read_content(path, problems))
     return blocks
 
 
 _CAPTURES = (".pcap", ".pcapng", ".cap")
 
 
-def _blocks_of(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
-    """Return when the first datagram with ASTERIX was captured, all of it, and how many others.
+def _asterix_of_capture(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
+    """Return when the first ASTERIX datagram was captured, the content of all of them joined, and
+    the number of other datagrams.
 
     Where not all can be read, each is tried by itself: other protocols may look like data blocks,
     and a radar may speak an edition that is not known.
@@ -184,14 +185,14 @@ def _blocks_of(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
     sent = udp_payloads(problems, data)
     blocks = [(time_s, payload) for time_s, payload in sent if _is_asterix(payload)]
     path = Path(problems.path)
-    if blocks and not _is_readable(path, b"".join(payload for _, payload in blocks)):
-        blocks = [one for one in blocks if _is_readable(path, one[1])]
+    if blocks and not _holds_asterix_records(path, b"".join(payload for _, payload in blocks)):
+        blocks = [one for one in blocks if _holds_asterix_records(path, one[1])]
     if not blocks:
         problems.fail(f"none of {len(sent)} datagrams of the capture is ASTERIX that can be read")
     return blocks[0][0], b"".join(payload for _, payload in blocks), len(sent) - len(blocks)
 
 
-def _is_readable(path: Path, data: bytes) -> bool:
+def _holds_asterix_records(path: Path, data: bytes) -> bool:
     try:
         read_records(path, data)
     except TrafficFileError:
@@ -203,9 +204,9 @@ def _read_capture(
     problems: Problems, data: bytes, altitude: Altitude | None,
     place: tuple[float, float, float] | None,
 ) -> Recording:  # fmt: skip
-    """Return the aircraft of the datagrams of a capture that are ASTERIX, on the capture's day."""
-    first_s, blocks, other = _blocks_of(problems, data)
-    recording = record_asterix(problems, blocks, altitude, of_day_s=first_s, place=place)
+    """Return a `Recording` of a capture's ASTERIX datagrams, dated by the capture's day."""
+    first_s, blocks, other = _asterix_of_capture(problems, data)
+    recording = recording_of_asterix(problems, blocks, altitude, of_day_s=first_s, place=place)
     if other:
         recording.notes.warnings.append(
             f"{other} datagrams are no ASTERIX that can be read and were left out"
@@ -269,4 +270,6 @@ def _read_parquet(
         except (pa.ArrowException, OSError, ValueError) as error:
             problems.fail(f"the Parquet file is damaged ({error})")
 
-    return record_rows(problems, headers, 1, rows(), None, altitude, stem, kind="a Parquet table")
+    return recording_of_rows(
+        problems, headers, 1, rows(), None, altitude, stem, kind="a Parquet table"
+    )

@@ -17,7 +17,7 @@ _SLOWEST_MPS = 5.0
 
 @dataclass(frozen=True)
 class _Piece:
-    """A stretch of a flight without a gap, and its first window among all."""
+    """A part of a flight without a gap, and the number of its first window among all windows."""
 
     flight: int
     samples: Samples
@@ -25,7 +25,7 @@ class _Piece:
 
 
 class TrackWindows:
-    """All windows of a duration in some flights, one for each second at which one may begin.
+    """All windows of one duration in several flights, one per second at which one can begin.
 
     `samples` are those of each flight; windows are closest to others `closest_s` after they begin.
     """
@@ -48,7 +48,7 @@ class TrackWindows:
         self.flights = len({piece.flight for piece in self._pieces})
 
     def draw_window(self, share: float) -> tuple[int, FloatArray]:
-        """Return the flight of the window at a share [0, 1) of all, and its path.
+        """Return a flight's number and the path of its window at a share [0, 1) of all windows.
 
         It is north, east and altitude (3, seconds + 1) in m, north and east from where it is at the
         closest approach.
@@ -67,8 +67,8 @@ class TrackWindows:
                                            np.zeros_like(lat))  # fmt: skip
         return piece.flight, np.array([north, east, alt])
 
-    def velocity(self, path: FloatArray) -> FloatArray:
-        """Return the velocity north, east and up at the closest approach, m/s."""
+    def velocity_at_closest(self, path: FloatArray) -> FloatArray:
+        """Return a path's velocity (3,) north, east, up (m/s) at its closest approach."""
         at = self._closest_s
         return np.asarray((path[:, at + 1] - path[:, at - 1]) / 2.0)
 
@@ -79,7 +79,7 @@ def is_flying(velocity: FloatArray) -> bool:
 
 
 def turn_path(path: FloatArray, velocity: FloatArray, course_rad: float) -> FloatArray:
-    """Return a path turned about the place of its closest approach, so that its course there is."""
+    """Return a path turned about its closest approach to have the course ``course_rad`` there."""
     angle = course_rad - np.arctan2(velocity[1], velocity[0])
     cos, sin = np.cos(angle), np.sin(angle)
     north, east, up = path
@@ -89,6 +89,8 @@ def turn_path(path: FloatArray, velocity: FloatArray, course_rad: float) -> Floa
 def place_other_path(
     own: FloatArray, other: FloatArray, at: int, place_m: tuple[float, float], up_m: float
 ) -> FloatArray:
-    """Return the other path moved so that it is at a place and so far above the own one then."""
+    """Return the other path shifted to the north and east by ``place_m``, and up so that it is
+    ``up_m`` above the own path at sample ``at``.
+    """
     shift = np.array([place_m[0], place_m[1], own[2, at] + up_m - other[2, at]])
     return np.asarray(other + shift[:, np.newaxis])

@@ -20,7 +20,7 @@ AWAY = "away"
 
 
 def join_recordings(recordings: Iterable[tuple[str, Recording]]) -> Recording:
-    """Return one recording of several files, by their names; the first aircraft stays the first.
+    """Return one recording of several files' aircraft; the first file's first stays first.
 
     An aircraft that several receivers heard is one by its address: later files fill in where those
     before heard nothing of it for a second. Others of one name are told apart by their files.
@@ -57,7 +57,7 @@ def join_recordings(recordings: Iterable[tuple[str, Recording]]) -> Recording:
 
 
 def _join_samples(first: Samples, other: Samples) -> Samples:
-    """Return the samples of an aircraft, and those of another file where there are none near."""
+    """Return an aircraft's samples with another file's at times when it has none close by."""
     times = first["time"]
     after = np.searchsorted(times, other["time"])
     gap = np.full(len(other["time"]), np.inf)
@@ -73,7 +73,7 @@ def _join_samples(first: Samples, other: Samples) -> Samples:
 
 
 def find_aircraft(problems: Problems, recording: Recording, name: str) -> str:
-    """Return the name of the aircraft that is called so, by its name or by its callsign alone."""
+    """Return an aircraft's name by name or callsign, in any case; error if none or several fit."""
     if name in recording.samples:
         return name
     low = name.strip().lower()
@@ -92,13 +92,13 @@ def find_aircraft(problems: Problems, recording: Recording, name: str) -> str:
 
 
 def drop_aircraft(recording: Recording, names: Collection[str]) -> Recording:
-    """Return a recording without some aircraft."""
+    """Return the recording without the aircraft that have the given names or callsigns."""
     gone = {find_aircraft(recording.problems, recording, name) for name in names}
     return replace(recording, samples={n: c for n, c in recording.samples.items() if n not in gone})
 
 
 def choose_ownship(recording: Recording, own: str) -> Recording:
-    """Return a recording whose ownship is another aircraft of it."""
+    """Return the recording with the named aircraft as the first one, which is the ownship."""
     first = {own: recording.samples[own]}
     return replace(recording, samples=first | recording.samples)
 
@@ -106,7 +106,7 @@ def choose_ownship(recording: Recording, own: str) -> Recording:
 def move_flight(
     columns: Samples, later_s: float, north_m: float, east_m: float, up_m: float
 ) -> Samples:
-    """Return a flight at another time, and as it is at another place."""
+    """Return a flight's samples ``later_s`` later and moved north, east and up (m)."""
     lat, lon, alt = (columns[key] for key in ("lat", "lon", "alt"))
     if north_m or east_m or up_m:
         start = (lat[0], lon[0], alt[0])
@@ -124,7 +124,7 @@ def move_flight(
 
 
 def cut_to_time(columns: Samples, from_s: float, to_s: float) -> Samples | None:
-    """Return the samples of a window of time and the one on either side; None where it is away."""
+    """Return samples from ``from_s`` to ``to_s`` and one more either side; None if not there."""
     times = columns["time"]
     if times[-1] < from_s or times[0] > to_s:
         return None

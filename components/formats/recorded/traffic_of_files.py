@@ -29,7 +29,7 @@ _EVERYWHERE = (-90.0, 90.0, -180.0, 180.0)
 
 @dataclass(frozen=True)
 class TrafficChoice:
-    """What is taken of recorded files; see the parameters of ``traffic.file``.
+    """Which aircraft, times and places are taken from files; see ``traffic.file``'s parameters.
 
     Parameters
     ----------
@@ -76,17 +76,17 @@ class TrafficChoice:
 
 
 def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
-    """Return the flights of recorded files, the ownship's first.
+    """Read recorded files and return the chosen flights, the ownship's first.
 
     TrafficFileError says all that is wrong.
     """
     names = [path.stem for path in paths]
-    each = (_record(path, choice) for path in paths)
+    each = (_recording_above_ellipsoid(path, choice) for path in paths)
     whole = drop_aircraft(join_recordings(zip(names, each, strict=True)), choice.without)
-    start_s = _earliest(whole)
+    start_s = _earliest_time_s(whole)
     own = {} if choice.scripted else _ownship_samples(whole, choice, start_s)
     others = {name: columns for name, columns in whole.samples.items() if name not in own}
-    begin_s, end_s = _window(choice, start_s, own)
+    begin_s, end_s = _begin_and_end_s(choice, start_s, own)
     kept = {}
     for name, columns in others.items():
         inside: Samples | None = cut_to_time(columns, begin_s, end_s)
@@ -104,12 +104,12 @@ def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
         own[name] = cut_to_time(columns, begin_s, end_s) or columns
     file = replace(whole, samples=own | kept).flights(choice.longest_gap_s, begin_s)
     if own:
-        _note_itself(file)
+        _warn_of_own_transponder(file)
     return file if math.isinf(end_s) else replace(file, end_s=end_s - begin_s)
 
 
-def _record(path: Path, choice: TrafficChoice) -> Recording:
-    """Return what a file holds, heights above sea level put above the ellipsoid."""
+def _recording_above_ellipsoid(path: Path, choice: TrafficChoice) -> Recording:
+    """Return a recording, its sea-level heights made ellipsoidal if the geoid's height is given."""
     one = record(path, choice.altitude, choice.place)
     if choice.geoid_m and one.above_sea:
         for name in one.above_sea:
@@ -120,12 +120,12 @@ def _record(path: Path, choice: TrafficChoice) -> Recording:
     return one
 
 
-def _earliest(recording: Recording) -> float:
+def _earliest_time_s(recording: Recording) -> float:
     return min((float(c["time"][0]) for c in recording.samples.values()), default=0.0)
 
 
 def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) -> dict[str, Samples]:
-    """Return the ownship's samples by its name, which no other aircraft has."""
+    """Return the ownship's samples, moved as chosen, under a name that no other aircraft has."""
     if choice.own_file is None:
         own = next(iter(whole.samples)) if choice.ownship is None else find_aircraft(
             whole.problems, whole, choice.ownship
@@ -133,7 +133,7 @@ def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) ->
         whole.samples = choose_ownship(whole, own).samples
         called, columns = own, whole.samples[own]
     else:
-        flight = _record(choice.own_file, choice)
+        flight = _recording_above_ellipsoid(choice.own_file, choice)
         own = next(iter(flight.samples)) if choice.ownship is None else find_aircraft(
             flight.problems, flight, choice.ownship
         )  # fmt: skip
@@ -147,13 +147,15 @@ def _ownship_samples(whole: Recording, choice: TrafficChoice, start_s: float) ->
     later_s = 0.0
     if choice.own_starts_s is not None:
         others = replace(whole, samples={n: c for n, c in whole.samples.items() if n != called})
-        first_s = _earliest(others) if others.samples else start_s
+        first_s = _earliest_time_s(others) if others.samples else start_s
         later_s = first_s + choice.own_starts_s - float(columns["time"][0])
     return {called: move_flight(columns, later_s, *choice.own_moved)}
 
 
-def _window(choice: TrafficChoice, start_s: float, own: dict[str, Samples]) -> tuple[float, float]:
-    """Return from when to when aircraft are flown; for ever where nothing says an end."""
+def _begin_and_end_s(
+    choice: TrafficChoice, start_s: float, own: dict[str, Samples]
+) -> tuple[float, float]:
+    """Return the first and last time (s) that are flown; the last is infinite if unlimited."""
     begin_s, end_s = start_s, math.inf
     for columns in own.values():
         if choice.own_file is not None:
@@ -185,8 +187,8 @@ def _refuse_absent(
 _ITSELF_M, _OFTEN, _OF_ITS_HEIGHT_M = 150.0, 10, 500.0
 
 
-def _note_itself(file: TrafficFile) -> None:
-    """Warn of an intruder that is where the ownship is: its own transponder, as it was heard."""
+def _warn_of_own_transponder(file: TrafficFile) -> None:
+    """Warn of an intruder that stays at the ownship, as it may be its own transponder."""
     own = file.ownship
     for craft in file.intruders:
         there = craft.at(own.sample_times_s)

@@ -48,8 +48,8 @@ def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int,
         )
 
 
-def _instant(text: str) -> float | str | None:
-    """Return an instant; the text itself where it is none, None where it is empty."""
+def _unix_time_or_text(text: str) -> float | str | None:
+    """Return an ISO 8601 text as Unix time (s); the text if it is no time, None if it is empty."""
     try:
         when = datetime.fromisoformat(text)
     except ValueError:
@@ -71,7 +71,7 @@ _CHUNK = 2**16
 def _elements(
     problems: Problems, data: bytes, begins: Collection[str], ends: Collection[str]
 ) -> Iterator[tuple[str, dict[str, str] | None, str, tuple[str, ...]]]:
-    """Yield name, attributes, text and parents of XML elements, at their begins or ends."""
+    """Yield XML elements' name, attributes (at begin), text (at end) and parent tags."""
     events: list[tuple[str, dict[str, str] | None, str, tuple[str, ...]]] = []
     inside: list[str] = []
     text: list[str] = []
@@ -115,7 +115,7 @@ def _read_gpx(problems: Problems, data: bytes, stem: str) -> Iterator[_Point]:
         elif tag == "trkpt":
             called = name if names.get(name, 0) < 2 else f"{name} {names[name]}"
             lon, lat = (_float(place.get(key, "")) for key in ("lon", "lat"))
-            yield called, _instant(when), lon, lat, _float(ele)
+            yield called, _unix_time_or_text(when), lon, lat, _float(ele)
         elif tag == "name" and inside[-1:] == ("trk",) and text:
             names[name] -= 1
             name = text
@@ -146,14 +146,14 @@ def _read_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -
                 said = f"heights are {_GROUND[text]} (altitudeMode {text})"
                 warnings.append(f"{said} and are read as above mean sea level")
         elif tag == "when" and parent == "Track":
-            time_s = _instant(text)
+            time_s = _unix_time_or_text(text)
             if isinstance(time_s, float):
                 whens.append(time_s)
             else:
                 odd[len(whens)] = time_s
                 whens.append(math.nan)
         elif tag == "coord":
-            coords.extend(_three(text.split()))
+            coords.extend(_lon_lat_height(text.split()))
         elif tag == "when":
             when = text
         elif tag == "coordinates" and parent == "Point":
@@ -163,7 +163,7 @@ def _read_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -
                 said = f"{len(whens)} times and {len(coords) // 3} positions"
                 problems.fail(f"a gx:Track has {said}")
             at = max((k for k, one in enumerate(inside) if one == "Placemark"), default=-1) + 1
-            name = names.get(at) or names.get(_document(inside)) or stem
+            name = names.get(at) or names.get(_document_depth(inside)) or stem
             if "MultiTrack" not in inside:
                 tracks[name] = tracks.get(name, 0) + 1
             called = name if tracks.get(name, 0) < 2 else f"{name} {tracks[name]}"
@@ -171,12 +171,12 @@ def _read_kml(problems: Problems, data: bytes, stem: str, warnings: list[str]) -
                 lon, lat, up = coords[3 * k : 3 * k + 3]
                 yield called, odd.get(k, one), lon, lat, up
         elif tag == "Placemark" and point and when:
-            name = names.get(_document(inside)) or stem
-            yield name, _instant(when), *_three(point.split(","))
+            name = names.get(_document_depth(inside)) or stem
+            yield name, _unix_time_or_text(when), *_lon_lat_height(point.split(","))
 
 
-def _document(inside: Sequence[str]) -> int:
-    """Return at which depth the document is, whose name all that has none of its own goes by."""
+def _document_depth(inside: Sequence[str]) -> int:
+    """Return the depth, from 1, of the KML ``Document`` in a path of tags; 0 if there is none."""
     return inside.index("Document") + 1 if "Document" in inside else 0
 
 
@@ -184,6 +184,6 @@ def _document(inside: Sequence[str]) -> int:
 _GROUND = {"relativeToGround": "above ground", "clampToGround": "not meant"}
 
 
-def _three(parts: list[str]) -> tuple[float, float, float]:
+def _lon_lat_height(parts: list[str]) -> tuple[float, float, float]:
     lon, lat, up = map(_float, [*parts, "", "", ""][:3])
     return lon, lat, up

@@ -71,7 +71,7 @@ def cfar_detection_probability(
 def cfar_multiplier(
     reference_cells: int, false_alarm_probability: float, *, pulses: int = 1
 ) -> float:
-    """Return the factor from the sum of the reference cells to the threshold.
+    """Return the factor from the reference cells' sum to the threshold, for a given Pfa.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def cfar_loss_db(
 
 @dataclass(frozen=True)
 class _Terms:
-    """Terms of the sums: how often a cell with k quanta is missed and detected."""
+    """Probabilities that a cell with k quanta of signal is missed or detected, for k = 0, 1, ..."""
 
     pulses: int
     cells: int
@@ -208,7 +208,7 @@ def _probability(snr: FloatArray, terms: _Terms, model: str) -> FloatArray:
 
 
 def _sum_terms(quanta: FloatArray, shape: float, terms: _Terms) -> FloatArray:
-    """Return Pd for mean numbers of quanta; the smaller of Pd and 1 - Pd is the one summed."""
+    """Return Pd for mean numbers of signal quanta, accurate for small Pd and small 1 - Pd."""
     from scipy.special import gammaln, xlogy
 
     k = np.arange(len(terms.missed), dtype=np.float64)

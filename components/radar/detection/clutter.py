@@ -56,7 +56,7 @@ _CHUNK = 4096
 
 
 def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: float) -> FloatArray:
-    """Return the probability that a steady signal in unit noise crosses a threshold.
+    """Return Marcum's Q1: the chance that a steady signal in unit noise crosses a threshold.
 
     Q_1(sqrt(2 signal), sqrt(2 threshold)) for flat arrays of power ratios, in the unit in which
     noise alone is Exponential(1), to a relative error below 1e-14 (1 - Q: below 1e-12 while it is
@@ -94,7 +94,7 @@ def marcum_q1(signal: FloatArray, threshold: FloatArray, largest_threshold: floa
 
 
 def _q1_of_any(signal: FloatArray, threshold: FloatArray) -> FloatArray:
-    """Return the same for any threshold; far out both amplitudes are large.
+    """Return Marcum's Q1 for thresholds of any size, with an asymptotic form for large ones.
 
     There Q1(a, b) is Q(b - a) + e/2, of which Q1(a, b) + Q1(b, a) = 1 + e is exact, with
     e = exp(-(a - b)²/2) i0e(a b).

@@ -43,7 +43,7 @@ def measured_snr(
     pulses: int = 1,
     model: str = "swerling2",
 ) -> Any:
-    """Return the SNR that a detection seems to have, given that it crosses the threshold.
+    """Return a detection's measured SNR, distributed given that it crosses the threshold.
 
     Detector output over its mean for noise, minus 1, linear, per pulse, from -1 on. `tail` in
     [0, 1] is the share of detections of such echoes that come out stronger, so that uniform numbers
@@ -67,11 +67,11 @@ def measured_snr(
     # A share of 0 is that of a draw below the last digit of a uniform number.
     share = np.maximum(share, 2.0**-54)
     with np.errstate(under="ignore"):  # far tails are 0
-        output = _survival_at_share(share, mean, level, count, name)
+        output = _output_at_survival_share(share, mean, level, count, name)
     return unflatten(np.maximum(output, level) / count - 1.0, shape)
 
 
-def _survival_at_share(
+def _output_at_survival_share(
     share: FloatArray, snr: FloatArray, threshold: FloatArray, pulses: int, model: str
 ) -> FloatArray:
     if pulses == 1 and model in ("swerling1", "swerling2"):
@@ -82,7 +82,7 @@ def _survival_at_share(
     scale = 1.0 + snr[gamma]
     output[gamma] = scale * _gamma_survival_quantile(share[gamma], threshold[gamma] / scale, pulses)
     rest = ~gamma
-    solve = _steady_survival_quantile if model == "swerling0" else _solve_survival
+    solve = _steady_survival_quantile if model == "swerling0" else _bisect_output_at_share
     output[rest] = solve(share[rest], snr[rest], threshold[rest], pulses, model)
     return output
 
@@ -117,10 +117,10 @@ def _steady_survival_quantile(
     return output
 
 
-def _solve_survival(
+def _bisect_output_at_share(
     share: FloatArray, snr: FloatArray, threshold: FloatArray, pulses: int, model: str
 ) -> FloatArray:
-    """Halve the interval in which the survival function is so much of that at the threshold."""
+    """Return, by bisection, the output with `share` times the threshold's survival chance."""
 
     def survival(output: FloatArray) -> FloatArray:
         return survival_of_sum(output, snr, pulses, model)
@@ -136,7 +136,7 @@ def _solve_survival(
 
 
 def survival_of_sum(output: FloatArray, snr: FloatArray, pulses: int, model: str) -> FloatArray:
-    """Return the probability that the sum of pulses of an echo of model I, III or IV is larger."""
+    """Return the chance that a Swerling I, III or IV echo's pulse sum exceeds an output."""
     from scipy.special import gammainc, gammaincc
 
     if model == "swerling4":
@@ -217,7 +217,7 @@ def false_alarm_snr(
     pulses: int = 1,
     threshold: float | None = None,
 ) -> Any:
-    """Return the SNR that a false alarm seems to have: noise, given that it crosses the threshold.
+    """Return false alarms' measured SNR: noise given that it crosses the threshold.
 
     One uniform number in [0, 1) each; the threshold follows from the probability where it is not
     given. Detector output over its mean, minus 1; linear, per pulse, never below 0.

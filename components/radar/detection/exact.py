@@ -36,8 +36,8 @@ _BLOCK = 4096
 _NEGLIGIBLE = 1e-18
 
 
-def geometric_gain(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
-    """Return Pd for K = 1 or 2; `echo` is n·SNR (flat array)."""
+def geometric_detection_probability(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
+    """Return Pd for a fluctuation of shape 1 or 2; `echo` is pulses times SNR (flat array)."""
     q, r = _echo_and_noise_shares(echo / shape)
     term = noise.term[: _count_noise_terms(noise)]
     total = _polynomial(term, q)
@@ -47,8 +47,8 @@ def geometric_gain(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArra
     return noise.false_alarm_probability + q * total
 
 
-def geometric_miss(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
-    """Return 1 - Pd for K = 1 or 2; `echo` is n·SNR (flat array)."""
+def geometric_miss_probability(noise: NoiseTerms, shape: int, echo: FloatArray) -> FloatArray:
+    """Return 1 - Pd for a fluctuation of shape 1 or 2; `echo` is pulses times SNR (flat array)."""
     q, r = _echo_and_noise_shares(echo / shape)
     missed = noise.missed[: _count_noise_terms(noise)]
     if shape == 2:
@@ -63,7 +63,7 @@ def _echo_and_noise_shares(scale: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _count_noise_terms(noise: NoiseTerms) -> int:
-    """Count the noise terms that matter beside the first ones."""
+    """Return the number of leading noise terms that are not negligible."""
     small = np.flatnonzero(noise.missed < _NEGLIGIBLE * noise.missed[0])
     return int(small[0]) + 1 if small.size else noise.missed.size
 
@@ -82,7 +82,7 @@ def _polynomial(coefficients: FloatArray, x: FloatArray) -> FloatArray:
     return total
 
 
-def _chain(
+def _sum_weighted_probabilities(
     noise: NoiseTerms,
     shape: int | None,
     echo: FloatArray,
@@ -90,7 +90,7 @@ def _chain(
     gain: bool,
     negligible: float,
 ) -> FloatArray:
-    """Sum Pr(N = j) · weight_j over a window around the largest term, for each n·SNR.
+    """Return each echo's sum over j of Pr(N = j) times a weight, around the largest term.
 
     With the weights `gained` (meant for n + echo < V_T) or `missed` (for the others), and any K
     (None: Poisson). Sums that are bound to stay below `negligible` are 0 and not worked out.
@@ -101,7 +101,7 @@ def _chain(
     work in a step neighbours; no element's arithmetic depends on another's.
     """
     weight = noise.gained if gain else noise.missed
-    anchor = _anchor(noise, shape, echo)
+    anchor = _index_of_largest_term(noise, shape, echo)
     if not gain:
         anchor = np.minimum(anchor, float(weight.size - 1))
     # The window is a function of the anchor alone. The weights of a gain level off at its far end
@@ -134,13 +134,15 @@ def _chain(
     total = np.zeros_like(echo)
     for start in range(0, work.size, _BLOCK):
         chosen = work[start : start + _BLOCK]
-        below = _run_up(weight, shape, z[chosen], low[chosen], whole[chosen])
-        total[chosen] = below + _run_down(weight, shape, z[chosen], whole[chosen], high[chosen])
+        below = _sum_up_to_anchor(weight, shape, z[chosen], low[chosen], whole[chosen])
+        total[chosen] = below + _sum_above_anchor(
+            weight, shape, z[chosen], whole[chosen], high[chosen]
+        )
     return first * total
 
 
-def _anchor(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatArray:
-    """Return the index near which Pr(N = j) g(n + j) is largest: neighbours are equal there."""
+def _index_of_largest_term(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatArray:
+    """Return j at about the largest term Pr(N = j) g(n + j), where neighbours are equal."""
     n, v = float(noise.pulses), noise.threshold
     if shape is None:
         # mean/(j+1) · V/(n+j+1) = 1
@@ -155,12 +157,12 @@ def _anchor(noise: NoiseTerms, shape: int | None, echo: FloatArray) -> FloatArra
     return np.floor(peak)
 
 
-def _ratio(shape: int | None, j: int) -> float:
+def _term_ratio(shape: int | None, j: int) -> float:
     """Return Pr(N = j) / Pr(N = j - 1) without its factor z (the mean, or q)."""
     return 1.0 / j if shape is None else (j + shape - 1.0) / j
 
 
-def _run_up(
+def _sum_up_to_anchor(
     weight: FloatArray, shape: int | None, z: FloatArray, low: IndexArray, anchor: IndexArray
 ) -> FloatArray:
     """Sum weight_j Pr(j)/Pr(anchor) for j = low … anchor."""
@@ -175,12 +177,12 @@ def _run_up(
         part = total[begin:end]
         if j > 0:
             np.multiply(part, inverse[begin:end], out=part)
-            np.multiply(part, 1.0 / _ratio(shape, j), out=part)
+            np.multiply(part, 1.0 / _term_ratio(shape, j), out=part)
         np.add(part, value, out=part)
     return total
 
 
-def _run_down(
+def _sum_above_anchor(
     weight: FloatArray, shape: int | None, z: FloatArray, anchor: IndexArray, high: IndexArray
 ) -> FloatArray:
     """Sum weight_j Pr(j)/Pr(anchor) for j = anchor + 1 … high."""
@@ -194,7 +196,7 @@ def _run_down(
         part = total[begin:end]
         np.add(part, weight[j], out=part)
         np.multiply(part, z[begin:end], out=part)
-        np.multiply(part, _ratio(shape, j), out=part)
+        np.multiply(part, _term_ratio(shape, j), out=part)
     return total
 
 
@@ -223,7 +225,7 @@ def exact_probability(
             exponent = threshold_of(1, pfa) / (1.0 + snr)
             result = -np.expm1(-exponent) if miss else np.exp(-exponent)
         else:
-            gain_side, miss_side = _sides(
+            gain_side, miss_side = _detection_and_miss_functions(
                 pulses, pfa, model, _UNDERFLOW if miss else _NO_TRACE_IN_PD
             )
             high = pulses * (1.0 + snr) >= threshold_of(pulses, pfa)
@@ -238,14 +240,16 @@ def exact_probability(
     return result
 
 
-def _sides(pulses: int, pfa: float, model: str, negligible: float) -> tuple[Side, Side]:
+def _detection_and_miss_functions(
+    pulses: int, pfa: float, model: str, negligible: float
+) -> tuple[Side, Side]:
     noise = noise_terms(pulses, pfa)
     shapes = {"swerling1": 1, "swerling2": pulses, "swerling3": 2, "swerling4": 2 * pulses}
     shape = shapes.get(model)
     if shape is not None and shape <= 2:
         return (
-            lambda snr: geometric_gain(noise, shape, pulses * snr),
-            lambda snr: geometric_miss(noise, shape, pulses * snr),
+            lambda snr: geometric_detection_probability(noise, shape, pulses * snr),
+            lambda snr: geometric_miss_probability(noise, shape, pulses * snr),
         )
     # An echo of 1e15 is missed with probability 0 (Poisson), and 1e100 is as good as infinite for
     # a negative binomial with K >= 3; the cap keeps the anchor's arithmetic finite.
@@ -253,7 +257,7 @@ def _sides(pulses: int, pfa: float, model: str, negligible: float) -> tuple[Side
 
     def chain(snr: FloatArray, gain: bool, negligible: float) -> FloatArray:
         echo = np.minimum(pulses * snr, cap)
-        return _chain(noise, shape, echo, gain=gain, negligible=negligible)
+        return _sum_weighted_probabilities(noise, shape, echo, gain=gain, negligible=negligible)
 
     return (
         lambda snr: pfa + chain(snr, True, -1.0),

@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from components.aircraft.known_targets import known_targets
-from components.sensor.ladder_values import measure_cells, over_cells
+from components.aircraft.known_targets import offered_rosters
+from components.sensor.ladder_values import make_cell_measure, over_cells
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
@@ -18,7 +18,7 @@ _PD = Quantity("detection_probability", "Pd", tolerance="detection_probability")
 
 
 def _pd_of(radar: Any, cells: Cells) -> FloatArray:
-    """Return the probability with which a radar detects each cell; 0 or 1 if it does not draw."""
+    """Return each cell's probability of detection; 1 or 0 if a threshold decides."""
     look = radar.look(cells)
     if "detection_probability" in look.extras:
         echo: FloatArray = np.where(
@@ -28,9 +28,9 @@ def _pd_of(radar: Any, cells: Cells) -> FloatArray:
     return np.where(look.detected, 1.0, 0.0)
 
 
-def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the errors of Pd at the SNR in use against sums at 40 digits (needs mpmath)."""
-    from components.high_precision.detection import detection_error
+def pd_truth_errors(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
+    """Return the cells' absolute errors of Pd, against sums at 40 digits (needs mpmath)."""
+    from components.high_precision.detection import detection_probability_error
 
     radar: Any = block
     if not hasattr(radar, "models_in_use"):
@@ -47,7 +47,7 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
 
     at = over_cells(radar, wake, values)
     errors = [
-        detection_error(
+        detection_probability_error(
             at["pd"][row, target],
             at["snr"][row, target],
             radar.p.pulses_summed,
@@ -60,13 +60,13 @@ def pd_truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatAr
     return {_PD.name: np.array(errors)}
 
 
-def _rcs(radar: Any, cells: Cells) -> dict[str, FloatArray]:
-    """Return the mean RCS and the probability of detection of each cell."""
+def _rcs_and_pd(radar: Any, cells: Cells) -> dict[str, FloatArray]:
+    """Return each cell's mean RCS and probability of detection, as columns."""
     return {"rcs": radar.mean_rcs_m2(cells), _PD.name: _pd_of(radar, cells)}
 
 
-def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the boundary: where the calibration knows Pd, else the radar's own limit."""
+def _boundary_settings(block: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the equivalent range boundary's settings: calibrated range, else ``range_km``."""
     if block["type"] == "radar.range_boundary":
         return {}
     if block.get("calibrate"):
@@ -76,13 +76,13 @@ def _boundary(block: Mapping[str, Any]) -> dict[str, Any]:
     raise Unavailable("needs calibrate.range_km or range_km to put the boundary at")
 
 
-def _averages(block: Component) -> str:
+def _cfar_note(block: Component) -> str:
     cells = getattr(block.p, "cfar_reference_cells", None)
     return "" if cells is None else f"cfar_reference_cells is {cells}: Pd has one method with CFAR"
 
 
-def _tables(block: Component) -> str:
-    rosters = known_targets(block.context)
+def _no_rcs_table_note(block: Component) -> str:
+    rosters = offered_rosters(block.context)
     if rosters and not any(craft.rcs_table for roster in rosters for craft in roster.aircraft):
         return "no target has an rcs_table"
     return ""
@@ -92,7 +92,7 @@ DETECTION = Ladder(
     "detection",
     (
         Rung("range_boundary", "all inside the calibrated range (section 2.2.2)",
-             "radar.range_boundary", _boundary),
+             "radar.range_boundary", _boundary_settings),
         Rung("threshold", "mean SNR against a threshold", "radar.threshold"),
         Rung("gram_charlier", "thesis eq. 26-31 at a sampled RCS", "radar.swerling",
              {"detection": "gram_charlier"}, {"fluctuation": "sampled"}),
@@ -103,10 +103,10 @@ DETECTION = Ladder(
     "exact",
     (_PD,),
     # What is too far away to be looked at is detected with probability 0.
-    measure_cells(lambda radar, cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0),
-    pd_truth,
+    make_cell_measure(lambda radar, cells: {_PD.name: _pd_of(radar, cells)}, out_of_range=0.0),
+    pd_truth_errors,
     clears=("model",),
-    applies=_averages,
+    applies=_cfar_note,
 )  # fmt: skip
 
 RCS = Ladder(
@@ -117,8 +117,8 @@ RCS = Ladder(
     ),
     "aspect",
     (Quantity("rcs", "m²"), _PD),
-    measure_cells(_rcs),
-    applies=_tables,
+    make_cell_measure(_rcs_and_pd),
+    applies=_no_rcs_table_note,
 )
 
 
@@ -140,7 +140,9 @@ class ExactDetection(Effect[str]):
     outside_the_proof = "it is a choice between two methods, of which one is always in use"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether Pd is computed exactly: by ``detection``, or where that is cheaper."""
+        """Return whether Pd is computed exactly: needs ``detection = 'exact'``; a table may replace
+        it where ``[accuracy]`` allows its error.
+        """
         if block.p.detection != "exact":
             return Verdict(False, f"detection is {block.p.detection!r}")
         if block.p.cfar_reference_cells is not None:
@@ -156,8 +158,8 @@ class ExactDetection(Effect[str]):
 
 
 def has_closed_form(block: Any) -> bool:
-    """Return whether the exact Pd of all targets is a single power, cheaper than any rung."""
-    return block.p.pulses_summed == 1 and _models(block) <= {1, 2}
+    """Return whether Pd is a single power for all targets (one pulse, Swerling I or II)."""
+    return block.p.pulses_summed == 1 and _swerling_models_in_use(block) <= {1, 2}
 
 
 def method_reasons(block: Any, method: str) -> list[str]:
@@ -184,12 +186,12 @@ def method_reasons(block: Any, method: str) -> list[str]:
     ]
 
 
-def _models(block: Any) -> set[int]:
+def _swerling_models_in_use(block: Any) -> set[int]:
     if block.p.samples_rcs:
         return {0}
     if block.p.swerling is not None:
         return {block.p.swerling % 5}
-    rosters = known_targets(block.context)
+    rosters = offered_rosters(block.context)
     if not rosters:
         return {0}
     return {craft.swerling % 5 for roster in rosters for craft in roster.aircraft}

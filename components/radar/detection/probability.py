@@ -127,7 +127,7 @@ def miss_probability(
 def probability_of_cells(
     snr: FloatArray, pulses: int, false_alarm_probability: float, model: str, method: str
 ) -> FloatArray:
-    """`detection_probability` for a flat contiguous SNR and one radar, all of it checked."""
+    """Return Pd by the named method for a flat contiguous array of valid SNR and one radar."""
     with np.errstate(under="ignore"):
         return _RUNGS[method](snr, pulses, false_alarm_probability, model)
 
@@ -143,7 +143,7 @@ def _probability(
 ) -> Any:
     name = check_swerling_model(model)
     one_of("method", method, METHODS)
-    shape, ratio, groups = _group(check_snr(snr), pulses, false_alarm_probability)
+    shape, ratio, groups = _group_by_pulses_and_pfa(check_snr(snr), pulses, false_alarm_probability)
     result = np.empty_like(ratio)
     # Tiny SNR and probabilities fade to 0; that is their value, not an error.
     with np.errstate(under="ignore"):
@@ -157,10 +157,10 @@ def _probability(
     return unflatten(result, shape)
 
 
-def _group(
+def _group_by_pulses_and_pfa(
     snr: FloatArray, pulses: ArrayLike, false_alarm_probability: ArrayLike
 ) -> tuple[tuple[int, ...], FloatArray, list[tuple[Any, float, float]]]:
-    """Return the shape, flat SNR, and which elements have which pulses and false alarms."""
+    """Return the broadcast shape, flat SNR, and (elements, pulses, Pfa) for each distinct pair."""
     n = check_pulses(pulses)
     pfa = check_probability("false_alarm_probability", false_alarm_probability)
     if n.ndim == 0 and pfa.ndim == 0:
@@ -246,7 +246,7 @@ MOST_LOOKS = 12
 
 
 def first_declaration_probability(pd: ArrayLike, m: int = 1, n: int = 1) -> FloatArray:
-    """Return the probability that m detections within n looks are first there at each look.
+    """Return each look's chance of being the first with m detections within n looks.
 
     Looks are independent, as those of scan-to-scan fluctuation are. Before the first look there
     are misses.

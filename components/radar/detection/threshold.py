@@ -138,7 +138,7 @@ def detection_threshold(pulses: ArrayLike, false_alarm_probability: ArrayLike) -
 
 @lru_cache(maxsize=4096)
 def threshold_of(pulses: int, false_alarm_probability: float) -> float:
-    """Return the threshold that so many summed pulses of noise exceed with this probability."""
+    """Return the threshold that the sum of the pulses' noise exceeds with the given probability."""
     if pulses == 1:
         return -math.log(false_alarm_probability)
     from scipy.special import gammainccinv
@@ -149,9 +149,9 @@ def threshold_of(pulses: int, false_alarm_probability: float) -> float:
     for _ in range(4):
         slope = _poisson_at(pulses - 1, threshold)
         if false_alarm_probability <= 0.5:
-            excess = slope * _sum_below(pulses, threshold) - false_alarm_probability
+            excess = slope * _poisson_sum_below(pulses, threshold) - false_alarm_probability
         else:
-            below = slope * _sum_from(pulses, threshold)
+            below = slope * _poisson_sum_from(pulses, threshold)
             excess = (1.0 - false_alarm_probability) - below
         step = excess / slope
         if not math.isfinite(step):
@@ -167,15 +167,15 @@ def _poisson_at(m: int, mean: float) -> float:
         return float(poisson(np.array([float(m)]), np.array([mean]))[0])
 
 
-def _sum_below(pulses: int, mean: float) -> float:
-    """Sum the Poisson terms 0 … pulses - 1, in units of the last one."""
+def _poisson_sum_below(pulses: int, mean: float) -> float:
+    """Return the sum of the Poisson terms 0 … pulses - 1, divided by the last one."""
     with np.errstate(under="ignore"):  # terms far below the last one are 0
         ratios = np.arange(pulses - 1, 0, -1, dtype=np.float64) / mean
         return math.fsum(np.cumprod(ratios).tolist()) + 1.0
 
 
-def _sum_from(pulses: int, mean: float) -> float:
-    """Sum the Poisson terms pulses, pulses + 1, …, in units of term pulses - 1."""
+def _poisson_sum_from(pulses: int, mean: float) -> float:
+    """Return the sum of the Poisson terms from `pulses` on, divided by the term pulses - 1."""
     count = int(40.0 + 40.0 * math.sqrt(pulses))
     with np.errstate(under="ignore"):  # terms far above are 0
         ratios = mean / np.arange(pulses, pulses + count, dtype=np.float64)
@@ -197,14 +197,14 @@ class Crossing:
     @classmethod
     @lru_cache(maxsize=256)
     def from_false_alarms(cls, pulses: int, false_alarm_probability: float) -> Crossing:
-        """Return the crossing of the threshold with this probability of false alarm."""
+        """Return the threshold that noise alone crosses with this probability of false alarm."""
         threshold = float(detection_threshold(pulses, false_alarm_probability))
         return cls(pulses, false_alarm_probability, threshold)
 
     @classmethod
     @lru_cache(maxsize=256)
     def from_snr(cls, pulses: int, snr_db: float) -> Crossing:
-        """Return that of a threshold on the SNR of a pulse, as the output over noise less 1."""
+        """Return the threshold given as SNR per pulse, dB, with its false alarm probability."""
         from scipy.special import gammaincc
 
         threshold = pulses * (1.0 + 10.0 ** (0.1 * snr_db))

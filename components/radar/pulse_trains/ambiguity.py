@@ -34,12 +34,12 @@ _ROUNDING_M = 1e-6
 
 
 def unambiguous_range_m(prf_hz: float) -> float:
-    """Return the range from beyond which echoes come after the next pulse has left, m."""
+    """Return the largest unambiguous range of a pulse repetition frequency, m."""
     return SPEED_OF_LIGHT_M_S / (2.0 * prf_hz)
 
 
 def received_share(range_m: ArrayLike, *, prf_hz: float, pulse_width_s: float) -> Any:
-    """Return the share of an echo that arrives while no pulse is sent.
+    """Return the share of an echo that is received, as none is while a pulse is sent.
 
     Parameters
     ----------
@@ -69,8 +69,8 @@ def received_share(range_m: ArrayLike, *, prf_hz: float, pulse_width_s: float) -
     return unflatten(np.clip(share - 1.0, 0.0, 1.0), shape)
 
 
-def decisive_share(shares: FloatArray, needed: int) -> FloatArray:
-    """Return the share by which `needed` of the PRFs see each target at least.
+def mth_largest_share(shares: FloatArray, needed: int) -> FloatArray:
+    """Return the `needed`-th largest share over the PRFs for each target.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def decisive_share(shares: FloatArray, needed: int) -> FloatArray:
 def coincident_range_m(
     range_m: FloatArray, *, prfs_hz: Sequence[float], seen: BoolArray, tolerance_m: float
 ) -> FloatArray:
-    """Return the range at which all PRFs that see a target agree, the nearest of several.
+    """Return a multi-PRF radar's range: the nearest where all PRFs that see the target agree.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def coincident_range_m(
     return found
 
 
-def prfs_in_the_clear(
+def count_clear_prfs(
     range_m: ArrayLike,
     range_rate_m_s: ArrayLike,
     *,
@@ -134,7 +134,7 @@ def prfs_in_the_clear(
     notch_m_s: float,
     least_share: float = 1.0,
 ) -> Any:
-    """Return how many PRFs see a target at a range and range rate; blind are those with too few.
+    """Return how many PRFs see a target at a range and range rate: not eclipsed, not filtered.
 
     Parameters
     ----------

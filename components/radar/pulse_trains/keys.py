@@ -8,7 +8,7 @@ from pydantic import Field, PositiveFloat, model_validator
 
 from components.messages.reach import Reach
 from components.radar.pulse_trains.ambiguity import (
-    decisive_share,
+    mth_largest_share,
     received_share,
     unambiguous_range_m,
 )
@@ -100,19 +100,19 @@ class PulseTrainParameters(SensorParameters):
 
     @property
     def farthest_report_m(self) -> float:
-        """The range that no report is beyond, by the pulses: where one PRF folds."""
+        """Largest reported range, m: the unambiguous if ranges fold with one PRF, else infinite."""
         if self.range_folds and len(self.prfs_hz) == 1:
             return unambiguous_range_m(self.prfs_hz[0])
         return float("inf")
 
     def reach(self) -> Reach:
-        """Return the reach, which ends where echoes come after the next pulse."""
+        """Return the reach; it ends at the unambiguous range if none is given and none folds."""
         reach = super().reach()
         if self.prf_hz is None or self.range_km is not None or self.range_folds:
             return reach
         return replace(reach, range_max_m=unambiguous_range_m(self.prf_hz))
 
-    def shares(self, range_m: FloatArray) -> FloatArray:
+    def received_shares(self, range_m: FloatArray) -> FloatArray:
         """Return the share of an echo that each PRF receives, (prfs, targets)."""
         if (width_s := self.pulse_width_s) is None:
             return np.ones((len(self.prfs_hz), len(range_m)))
@@ -122,5 +122,5 @@ class PulseTrainParameters(SensorParameters):
         )  # fmt: skip
 
     def decisive_share(self, shares: FloatArray) -> FloatArray:
-        """Return the share that decides whether enough PRFs see each target."""
-        return decisive_share(shares, self.prfs_needed or len(self.prfs_hz))
+        """Return the share received by at least as many PRFs as must see a target, (targets,)."""
+        return mth_largest_share(shares, self.prfs_needed or len(self.prfs_hz))

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from components.examples import folder
+from components.examples import configs_folder
 from components.line_of_sight.error_map import (
     CAMERA_DEG,
     RADAR_DEG,
@@ -34,7 +34,7 @@ from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.executors import default_workers
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 #: A pixel of the camera, which errors of direction are compared with.
 PIXEL_DEG = 0.0358
@@ -62,14 +62,14 @@ def head_lines(costs: Sequence[Any], cut_off: str) -> str:
         ratio = us(block, one) / us(block, other)
         return "as much" if 1 / 1.1 < ratio < 1.1 else f"{ratio:.2g} times as much"
 
-    flat = of["transform", "flat_earth"].error.maximum
+    flat = of["transform", "flat_earth"].first_quantity_error.maximum
     instant, window = of["fusion", "exact_instant"], of["fusion", "window"]
     return _HEAD.format(
         flat_saves=saved("transform", "flat_earth", "ellipsoid"),
         flat_max=f"{flat:.1f}",
         flat_pixels=f"{flat / math.radians(PIXEL_DEG) / 1e3:.1f}",
         attitude_saves=saved("transform", "small_angle", "exact"),
-        small_angle=f"{of['transform', 'small_angle'].error.maximum:.0f}",
+        small_angle=f"{of['transform', 'small_angle'].first_quantity_error.maximum:.0f}",
         table_times=times("radar", "table", "exact"),
         gram_times=times("radar", "gram_charlier", "exact"),
         boundary_saves=saved("radar", "range_boundary", "exact"),
@@ -85,7 +85,7 @@ def head_lines(costs: Sequence[Any], cut_off: str) -> str:
         window_extra=saved("fusion", "exact_instant", "window"),
         share=f"{window.effect['fused_share'] - window.effect['fused_share_change']:.0%}",
         window_share=f"{window.effect['fused_share']:.0%}",
-        window_range=f"{window.error.p95 - instant.error.p95:.1f}",
+        window_range=f"{window.first_quantity_error.p95 - instant.first_quantity_error.p95:.1f}",
     )
 
 
@@ -274,7 +274,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument(
         "--encounter",
         type=Path,
-        default=folder() / "encounters" / "crossing.daa",
+        default=configs_folder() / "encounters" / "crossing.daa",
         help="encounter for the second half; the published page was made with NRC_Intercept23.daa",
     )
     parser.add_argument("--encounter-says", default="a made-up crossing", help="what it is")
@@ -284,28 +284,28 @@ def main(arguments: Sequence[str] | None = None) -> int:
     images: Path = options.docs / "images"
     images.mkdir(parents=True, exist_ok=True)
 
-    from dsa_des.commands.cost import comparison, ladders_to_climb
-    from dsa_des.costs.chain import draw_chain, run_chain
-    from dsa_des.costs.climb import RungCost, climb
+    from dsa_des.commands.cost import comparison_of_all_reports, ladders_to_climb
+    from dsa_des.costs.chain import draw_chain, run_rung_combinations
+    from dsa_des.costs.climb import RungCost, measure_rungs
     from dsa_des.costs.cost_report import draw_costs
     from dsa_des.costs.variants import Variants
 
-    compare = comparison()
+    compare = comparison_of_all_reports()
 
     def costs_of(
         scene: str, *sets: str, block: str | None = None, duration_s: object = None
     ) -> tuple[Variants, list[RungCost]]:
-        variants = Variants(str(folder() / scene), sets=sets, duration_s=duration_s)
+        variants = Variants(str(configs_folder() / scene), sets=sets, duration_s=duration_s)
         climbs, _ = ladders_to_climb(variants, block, None)
         return variants, [
             cost
             for name, ladder in climbs
-            for cost in climb(variants, name, ladder, compare=compare)
+            for cost in measure_rungs(variants, name, ladder, compare=compare)
         ]
 
     variants, first = costs_of("first_light.toml")
     draw_costs(images / "cost_first_light.png", variants.scene.title, first)
-    chain, picked = run_chain(variants, first, compare)
+    chain, picked = run_rung_combinations(variants, first, compare)
     label = compare.difference.label
     draw_chain(images / "cost_chain.png", variants.scene.title, chain, label)
     flown, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
@@ -351,7 +351,7 @@ def _tables(costs: Sequence[Any]) -> str:
     for _, group in groupby(costs, key=lambda cost: (cost.block, cost.ladder.name)):
         rungs = list(group)
         quantity = rungs[0].ladder.quantities[0]
-        if all(cost.unavailable or cost.error.count == 0 for cost in rungs):
+        if all(cost.unavailable or cost.first_quantity_error.count == 0 for cost in rungs):
             lines += [f"**{rungs[0].block}, {rungs[0].ladder.name}**: no target was in view.", ""]
             continue
         lines += [
@@ -378,7 +378,7 @@ def _tables(costs: Sequence[Any]) -> str:
 
 def _line(cost: Any) -> str:
     name = f"**{cost.rung}**" if cost.pareto else cost.rung
-    error = cost.error
+    error = cost.first_quantity_error
     cells = [
         name + (" (scene)" if cost.in_scene else ""),
         f"{cost.cpu_us_per_target_scan:.3g} ± {float(f'{cost.cpu_spread_us:.1g}'):g}",
@@ -411,5 +411,5 @@ def _chain(chain: list[dict[str, Any]], picked: str) -> str:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -91,7 +91,7 @@ def section(made: Sequence[AnswerReport], studies: Sequence[AskedStudy] = STUDIE
 def _tables(report: AnswerReport) -> list[str]:
     lines: list[str] = []
     for result in report.results:
-        every = list(report.cells(result.name))
+        every = list(report.table_rows(result.name))
         rows = [row for row in every if row[-1] != "same"]
         used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
         lines += [f"**{report.title_of(result.name)}**", ""]

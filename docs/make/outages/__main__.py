@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd  # type: ignore[import-untyped]
 
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 _EVENTS = ("nmac", "well_clear_lost")
@@ -98,5 +98,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -31,7 +31,7 @@ from dsa_des.files.output_file import write_file
 from dsa_des.record.drawing import draw_to_png
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 FIGURE = "pictures.png"
 SEEN = "picture_patches.png"
@@ -290,5 +290,5 @@ def main(argv: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main(sys.argv[1:]))

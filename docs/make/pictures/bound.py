@@ -10,7 +10,7 @@ import numpy as np
 import components.optical.image as image
 from components.optical.picture import union_coverage
 from docs.make.pictures.flow import SIZES, recorded
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say_lines
 
 _STEP_PX, _DRAWS = 0.05, 200
@@ -22,7 +22,7 @@ class BoundedCamera(image.ImageCamera):
 
     told: ClassVar[dict[tuple[str, int], Any]] = {}
 
-    def _frame(self, scene: Any, corner: Any, middle: Any, attitude: Any, which: int) -> Any:
+    def _render_patch(self, scene: Any, corner: Any, middle: Any, attitude: Any, which: int) -> Any:
         if which == image._CURRENT:
             step = _STEP_PX * scene.binned
             slope = [
@@ -37,7 +37,7 @@ class BoundedCamera(image.ImageCamera):
             # Both frames are noisy; a coarser picture has less noise and fewer pixels.
             noise = self.pixel_noise / scene.binned
             self.told[key, scan] = 2.0 * noise**2 * np.linalg.inv(information)
-        return super()._frame(scene, corner, middle, attitude, which)
+        return super()._render_patch(scene, corner, middle, attitude, which)
 
     def _covered(self, scene: Any, corner: Any, middle: Any) -> Any:
         side = 2 * scene.half
@@ -103,5 +103,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -12,7 +12,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 _SESSION = Path(__file__).parents[3] / "configs" / "operator" / "session.toml"
 
@@ -57,5 +57,5 @@ def _shoot(page: Any, when: str, path: Path) -> None:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         pictures(Path(sys.argv[1]))

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import j1
 
 import dsa_des
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say_lines
 
 BLUR_PIXELS, PIXELS, HALF_DEG = 0.5, 1024, 5.0
@@ -136,5 +136,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

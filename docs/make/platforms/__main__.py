@@ -12,7 +12,7 @@ from pathlib import Path
 import pandas as pd  # type: ignore[import-untyped]
 
 from docs.make.platforms import campaign, equipage, link_latency
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 
@@ -33,5 +33,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

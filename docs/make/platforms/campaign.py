@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.results.statistics import estimate_rare_mean, wilson_interval
+from dsa_des.results.statistics import estimate_rare_probability, wilson_interval
 
 #: Events and runs by plain counting in github.com/fazlurnu/OpenCDaRR (MIT), scripts/validation, of
 #: pairs by crossing angle and of rings by number, and the errors of positions, m.
@@ -61,7 +61,7 @@ def rows(studies: Sequence[Any]) -> list[str]:
     for cell, (events, runs) in sorted(counted(studies).items()):
         lines.append(_line(cell, str(events), runs, _between(events, runs), events >= _LEAST))
     for cell, mine in _cells(studies, split=True):
-        found = estimate_rare_mean(
+        found = estimate_rare_probability(
             np.array(mine[_LOST]), np.array(mine[f"{_LOST}.unseen"]), _CONFIDENCE
         )
         many = int(mine[f"{_LOST}.runs"].sum())

@@ -14,7 +14,7 @@ from types import ModuleType
 import docs.make.published as package
 from docs.make.stamp import stamped
 from dsa_des.files.output_file import write_file
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 PAGE = Path(__file__).parents[2] / "published.md"
 _BEGIN, _END = "<!-- section: {} -->", "<!-- end -->"
@@ -87,5 +87,5 @@ def _without_title(text: str) -> str:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         main()

@@ -14,9 +14,13 @@ import dsa_des
 from components.arguments.units import FOOT_M, KNOT_M_S, NAUTICAL_MILE_M
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
-from components.encounters.pairing import Pairs, PairSampler, set_of_pairs
+from components.encounters.pairing import Pairs, PairSampler, encounter_set_of_pairs
 from components.formats.set_file import write_set
-from components.visual.acquisition import VISUAL_RANGE_DEPTH, closing_opportunity, round_share
+from components.visual.acquisition import (
+    VISUAL_RANGE_DEPTH,
+    integrated_acquisition_rate,
+    probability_met_by_round,
+)
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.seen_in_time import Eyes, shares_unseen
 from docs.make.published.volumes import VOLUMES, violates
@@ -59,7 +63,7 @@ def in_closed_form(speed_kt: float, looking: float, size_ft: float = SIZE_FT) ->
     """Return the probability to see an aircraft in time, of a search that comes round."""
     speed = speed_kt * KNOT_M_S
     shown_m = size_ft * FOOT_M / math.radians(SMALLEST_ARCMIN / 60.0)
-    return round_share(
+    return probability_met_by_round(
         speed, from_m=shown_m, to_m=NEEDED_S * speed, round_s=ROUND_S, looking=looking
     )
 
@@ -68,7 +72,7 @@ def by_rate(speed_kt: float, area_ft2: float, visual_range_nmi: float) -> float:
     """Return the same by Andrews's rate, of one who looks out all the time."""
     speed = speed_kt * KNOT_M_S
     return -math.expm1(
-        -closing_opportunity(
+        -integrated_acquisition_rate(
             area_ft2 * FOOT_M**2, speed, from_m=math.inf, to_m=NEEDED_S * speed,
             extinction_per_m=VISUAL_RANGE_DEPTH / (visual_range_nmi * NAUTICAL_MILE_M),
         )
@@ -137,7 +141,7 @@ def chosen_pairs(model: Path, count: int) -> tuple[Pairs, list[Pairs]]:
     sampler = PairSampler(known, known, 1, PairingRules())
     parts, hit = [], []
     for start in range(0, count, _AT_ONCE):
-        pairs = sampler.pairs(range(start, min(start + _AT_ONCE, count)))
+        pairs = sampler.sample_pairs(range(start, min(start + _AT_ONCE, count)))
         nmac = violates(VOLUMES["nmac"], pairs)
         lost = violates(_LOST, pairs) & ~nmac
         taken = [np.flatnonzero(nmac)]
@@ -161,7 +165,7 @@ def sets_of_both(folder: Path, pairs: Pairs) -> tuple[Path, Path]:
     turned = {name: getattr(pairs, name)[::-1] for name in _OF_BOTH}
     paths = folder / "own.parquet", folder / "other.parquet"
     for path, some in zip(paths, (pairs, replace(pairs, **turned)), strict=True):
-        made = set_of_pairs(some, PairingRules().closest_s, (41.0, -88.0), str(path))
+        made = encounter_set_of_pairs(some, PairingRules().closest_s, (41.0, -88.0), str(path))
         write_set(path, {"made_by": "docs.make.published.eyes"}, [made])
     return paths
 

@@ -27,7 +27,7 @@ from docs.make.published.turn_flights import (
 from docs.make.published.turn_geometry import least_range_m
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, GREEN, ORANGE
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 TITLE = "The least range of detection, and its risk ratio"
@@ -295,5 +295,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         main()

@@ -17,7 +17,7 @@ from components.optical.silhouette import visible_area
 from components.visual.acquisition import (
     UNALERTED_PER_SR_S,
     VISUAL_RANGE_DEPTH,
-    acquisition_rate,
+    acquisition_rate_per_s,
     angular_size_rad,
 )
 from dsa_des.arrays.types import FloatArray
@@ -73,7 +73,7 @@ def opportunity(pairs: Pairs, eyes: Eyes, observer: int) -> FloatArray:
     shows = (azimuth >= eyes.azimuth_deg[0]) & (azimuth <= eyes.azimuth_deg[1])
     shows &= (elevation >= eyes.elevation_deg[0]) & (elevation <= eyes.elevation_deg[1])
     shows &= angular_size_rad(area, range_m) >= math.radians(eyes.smallest_arcmin / 60.0)
-    rate = acquisition_rate(
+    rate = acquisition_rate_per_s(
         area, range_m, beta_per_sr_s=eyes.beta_per_sr_s * eyes.looking,
         extinction_per_m=VISUAL_RANGE_DEPTH / (eyes.visual_range_nmi * NAUTICAL_MILE_M),
     )  # fmt: skip

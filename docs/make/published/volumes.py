@@ -76,7 +76,7 @@ def sampled(
     sampler = PairSampler(read_model(own), read_model(intruder), seed, used)
     parts = []
     for start in range(0, count, _AT_ONCE):
-        pairs = sampler.pairs(range(start, min(start + _AT_ONCE, count)))
+        pairs = sampler.sample_pairs(range(start, min(start + _AT_ONCE, count)))
         violated = {name: violates(volume, pairs) for name, volume in volumes.items()}
         steps = [np.diff(getattr(pairs, f"{axis}_ft")[1] - getattr(pairs, f"{axis}_ft")[0], axis=0)
                  [used.closest_s] for axis in ("north", "east", "up")]  # fmt: skip

@@ -19,7 +19,7 @@ from dsa_des.block.registry import find_component
 from dsa_des.commands.parameters import Row, scene_tables
 from dsa_des.files.output_file import write_file
 from dsa_des.running.processors import Processing
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 _HEAD = f"""# Reference
 
@@ -125,5 +125,5 @@ def main(arguments: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main(sys.argv[1:]))

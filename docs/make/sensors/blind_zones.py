@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from components.arguments.units import SPEED_OF_LIGHT_M_S
-from components.radar.pulse_trains.ambiguity import prfs_in_the_clear
+from components.radar.pulse_trains.ambiguity import count_clear_prfs
 from components.thesis.drawing import panels
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 FIGURE = "blind_zones.png"
 #: The first four are those of docs/sensors.md, "Pulses".
@@ -24,7 +24,7 @@ def zones(cells: int) -> dict[str, np.ndarray]:
     middle = (np.arange(cells) + 0.5) / cells
     blind = {}
     for count, needed in ((1, 1), (4, NEEDED), (8, NEEDED)):
-        seen = prfs_in_the_clear(
+        seen = count_clear_prfs(
             middle[:, np.newaxis] * FARTHEST_M,
             (2.0 * middle - 1.0) * FASTEST_M_S,
             prfs_hz=PRFS_HZ[:count],
@@ -65,5 +65,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from components.laser.range_equation import (
-    laser_power_w,
+    beam_share_on_wire,
+    mean_shots_on_target,
+    received_laser_power_w,
     scan_detection_probability,
-    shots_on_target,
-    wire_share,
 )
 from components.optical.detection import deviations_of_exceedance
 
@@ -25,14 +25,15 @@ def wire_within_a_second(diameter_mm: float, range_m: float, power: float = 1.0)
     with LASER.open("rb") as file:
         p: dict[str, Any] = tomllib.load(file)
     beam_rad, thick_m = 1e-3 * p["divergence_mrad"], 1e-3 * diameter_mm
-    echo_w = laser_power_w(
-        wire_share(thick_m, range_m, beam_rad), range_m, peak_power_w=power * p["peak_power_w"],
+    echo_w = received_laser_power_w(
+        beam_share_on_wire(thick_m, range_m, beam_rad), range_m,
+        peak_power_w=power * p["peak_power_w"],
         aperture_m=1e-3 * p["aperture_mm"], efficiency=p["efficiency"],
         reflectivity=REFLECTIVITY,
     )  # fmt: skip
     width, height = (np.ptp(np.radians(p[f"{axis}_deg"])) for axis in ("azimuth", "elevation"))
     length_rad = SPAN_M / range_m
-    shots = shots_on_target(
+    shots = mean_shots_on_target(
         length_rad * thick_m / range_m, 0.25 * np.pi * length_rad * beam_rad,
         width * height / (p["azimuth_shots"] * p["elevation_shots"]),
     )  # fmt: skip

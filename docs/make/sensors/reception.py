@@ -20,7 +20,7 @@ from components.surveillance.reception import (
 )
 from dsa_des.block.mark import BLUE, ORANGE
 from dsa_des.record.drawing import draw_to_png
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say_lines
 
 #: Aircraft and airports around: few, the default's, many.
@@ -99,5 +99,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -5,7 +5,7 @@ import sys
 
 from docs.make.track_consistency.cases import CASES
 from docs.make.track_consistency.nees import nees_of, summary
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 
@@ -36,5 +36,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

@@ -17,14 +17,14 @@ import numpy as np
 
 import dsa_des
 from components.messages.state_tracks import COVARIANCE
-from components.metrics.separation import traffic_of
+from components.metrics.separation import traffic_and_duration
 from components.metrics.true_states import states_in_frame
 from docs.make.track_consistency.cases import OWNSHIP, Case
 from docs.make.track_consistency.nees import tracks_of
 from docs.make.track_consistency.scenes import scene_of_case
 from dsa_des.arrays.types import FloatArray
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.terminal.interruption import plain_ending
+from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say
 
 BEGINS_S, DURATION_S, RATES_HZ = 20.0, 75.0, (0.5, 1, 5)
@@ -88,7 +88,7 @@ def measured(
     )
     scene = dsa_des.load_scene({**table, "duration_s": DURATION_S})
     scenes = [replica_scene(scene, Replica(1 + i, {})) for i in range(replicas)]
-    targets = traffic_of(scenes[0])[0].targets
+    targets = traffic_and_duration(scenes[0])[0].targets
     times = np.arange(10.0, DURATION_S, max(1.0, 1.0 / rate_hz))
     square, nees = np.full((2, replicas, len(targets), len(times)), np.nan)
     for replica, found in enumerate(tracks_of(scenes)):
@@ -152,5 +152,5 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    with plain_ending():
+    with exit_plainly_on_signal():
         sys.exit(main())

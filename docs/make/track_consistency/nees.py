@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from components.messages.state_tracks import COVARIANCE
-from components.metrics.separation import traffic_of
+from components.metrics.separation import traffic_and_duration
 from components.metrics.true_states import states_in_frame
 from docs.make.track_consistency.cases import Case
 from docs.make.track_consistency.scenes import scenes_of
@@ -53,7 +53,7 @@ def nees_of(case: Case, replicas: int) -> FloatArray:
     found: list[FloatArray] = []
     with tempfile.TemporaryDirectory() as folder:
         for scenes in scenes_of(case, replicas, Path(folder)):
-            targets = traffic_of(scenes[0])[0].targets
+            targets = traffic_and_duration(scenes[0])[0].targets
             for table in tracks_of(scenes):
                 found.append(_of_run(table, targets, case.within_m))
     return np.concatenate(found)

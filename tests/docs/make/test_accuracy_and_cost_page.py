@@ -8,8 +8,8 @@ import pytest
 from components.line_of_sight.transform import EARTH
 from components.optical.sensors import VISIBLE
 from docs.make.accuracy_and_cost.__main__ import DOCS, error_map_section, main
-from dsa_des.commands.cost import comparison
-from dsa_des.costs.climb import climb
+from dsa_des.commands.cost import comparison_of_all_reports
+from dsa_des.costs.climb import measure_rungs
 from dsa_des.costs.variants import Variants
 
 PAGE = (DOCS / "accuracy-and-cost.md").read_text(encoding="utf-8")
@@ -36,7 +36,9 @@ def test_errors_and_effects_are_those_that_are_computed(block, ladder, skip):
         rung for rung in ladder.rungs if rung.name in quick)})  # fmt: skip
     variants = Variants(str(DOCS.parent / "configs" / "first_light.toml"))
     scene = PAGE[PAGE.index("## The thesis's scene") : PAGE.index("## A flown encounter")]
-    for cost in climb(variants, block, small, repeats=1, compare=comparison()):
+    for cost in measure_rungs(
+        variants, block, small, repeats=1, compare=comparison_of_all_reports()
+    ):
         if cost.rung in skip:
             continue
         row = next(
@@ -46,7 +48,13 @@ def test_errors_and_effects_are_those_that_are_computed(block, ladder, skip):
         )
         cells = [cell.strip() for cell in row.strip("|").split("|")]
         for text, value in zip(
-            cells[2:5], (cost.error.mean, cost.error.p95, cost.error.maximum), strict=True
+            cells[2:5],
+            (
+                cost.first_quantity_error.mean,
+                cost.first_quantity_error.p95,
+                cost.first_quantity_error.maximum,
+            ),
+            strict=True,
         ):
             assert float(text) == pytest.approx(value, rel=0.06)
         assert int(cells[7]) == cost.effect["detections_gained"]

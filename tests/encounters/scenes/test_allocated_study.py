@@ -11,7 +11,7 @@ from click.testing import CliRunner
 import dsa_des
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
-from dsa_des.studies import allocation, foreseen
+from dsa_des.studies import allocation, foreseen_runs
 from dsa_des.studies.study_file import read_study
 from tests.encounters.scenes.test_closed_loop_risk import SCENE
 from tests.encounters.test_set_file import call
@@ -69,7 +69,7 @@ class Breaking(EncounterWeight):
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Scene and set; the first 20 runs are the first round."""
-    for module in (allocation, foreseen):
+    for module in (allocation, foreseen_runs):
         monkeypatch.setattr(module, "PILOT", 20)
     for name, text in (("made", RECIPE), ("scene", SCENE)):
         (tmp_path / f"{name}.toml").write_text(text, encoding="utf-8")

@@ -34,14 +34,14 @@ def test_a_chunk_beyond_any_cache_makes_each_encounter_once(
     made: dict[str, Counter[Any]], tmp_path: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Of 1,300 runs in one chunk, 650 of which run together; then the metrics ask again."""
-    monkeypatch.setattr(lock_step_size.RunSize, "most", 1024)
+    monkeypatch.setattr(lock_step_size.RunSize, "largest_run_count", 1024)
     scene = chain({"radar": sensor("radar.range_boundary", scan_rate_hz=1)}, duration_s=1)
     (tmp_path / "model.txt").write_text(GAS, encoding="utf-8")
     scene["blocks"]["traffic"] = {
         "type": "traffic.encounter_model", "file": str(tmp_path / "model.txt"),
         "lat_deg": 52, "lon_deg": 4,
     }  # fmt: skip
-    assert not lock_step_size.are_few(dsa_des.load_scene(scene), RUNS)
+    assert not lock_step_size.surely_fit_in_memory(dsa_des.load_scene(scene), RUNS)
     study = dsa_des.study(
         scene, metrics=["encounter_weight", "closest_approach"], replicas=RUNS, workers=1,
         draws={"blocks.traffic.encounter": {"sequence": [0, 1]}}, runs_per_chunk=RUNS,

@@ -136,7 +136,7 @@ def turning(folder) -> int:
     from components.encounters.pairing import PairSampler
 
     read = read_model(folder / "model.txt")
-    pairs = PairSampler(read, read, 0, PairingRules()).pairs(range(40))
+    pairs = PairSampler(read, read, 0, PairingRules()).sample_pairs(range(40))
     turned = np.abs(np.diff(pairs.turn_rad_s[:, :6], axis=1)).max(axis=(0, 1))
     return int(np.argmax(turned))
 

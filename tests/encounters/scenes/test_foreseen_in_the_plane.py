@@ -11,9 +11,9 @@ from wired import sensor
 import dsa_des
 from components.encounters import risk_metric
 from components.encounters.risk_metric import may_climb
-from components.well_clear.missed_cylinder import Missed, probability_led_into
+from components.well_clear.missed_cylinder import Missed, probability_of_induced_entry
 from dsa_des.block.registry import find_component
-from dsa_des.studies.foreseen import predict_results
+from dsa_des.studies.foreseen_runs import predict_results
 from dsa_des.studies.study_file import read_study
 from tests.encounters.scenes.test_closed_loop_risk import SCENE
 from tests.encounters.test_pairing import TURNS
@@ -124,9 +124,9 @@ def test_turns_lead_to_the_side_at_the_same_altitude_and_climbs_up_or_down() -> 
         beside=np.array([100.0, 502.4, 5000.0, never, never]),
         above=np.array([10.0, never, 60.0, 130.48, never]),
     )
-    turned = probability_led_into((152.4, 30.48), missed, climbs=False)
+    turned = probability_of_induced_entry((152.4, 30.48), missed, climbs=False)
     assert turned == pytest.approx([1.0, e, e, 0.0, 0.0], abs=1e-12)
-    climbed = probability_led_into((152.4, 30.48), missed, climbs=True)
+    climbed = probability_of_induced_entry((152.4, 30.48), missed, climbs=True)
     assert climbed[[0, 1, 3, 4]] == pytest.approx([1.0, e, e, 0.0])
 
 

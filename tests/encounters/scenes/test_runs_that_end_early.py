@@ -204,7 +204,7 @@ def test_an_end_is_early_only_if_it_is(tmp_path):
 def test_metrics_of_runs_that_end_differently(tmp_path, monkeypatch, rules_s):
     """Runs of a chunk share flights, batches and tables; each is measured as if it were alone."""
     monkeypatch.setattr(lock_step_size, "FEW", 0)
-    monkeypatch.setattr(lock_step_size.RunSize, "most", 2)
+    monkeypatch.setattr(lock_step_size.RunSize, "largest_run_count", 2)
     wanted = scene([BACK, crooked.ROLLING])
     (tmp_path / "scene.toml").write_text(to_toml(wanted), encoding="utf-8")
     base = load_scene(tmp_path / "scene.toml")

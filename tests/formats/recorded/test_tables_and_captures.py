@@ -138,7 +138,7 @@ def test_units_of_autopilots_and_cells_of_several_lines(tmp_path):
     assert one["time"].tolist() == [1.0, 2.0] and one["lat"].tolist() == [47.0, 47.0]
     assert one["lon"] == pytest.approx([8.0, 8.0005868]) and one["alt"].tolist() == [1000.0] * 2
     assert one["ve"] == pytest.approx([44.704, 44.704])
-    found.notes.settle()
+    found.notes.summarize_aircraft_notes()
     assert found.notes.warnings == ["a: 1 of its samples stand there again and count once"]
 
 

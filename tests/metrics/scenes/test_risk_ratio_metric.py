@@ -10,7 +10,7 @@ from test_mitigated_metric import SIZES, scene
 from wired import measured
 
 import dsa_des
-from components.encounters.risk_metric import side_of
+from components.encounters.risk_metric import bearing_sector
 
 KIND = ("[metric risk_ratio]",)
 NMAC, LOSS = "nmac_risk_ratio", "well_clear_lost_risk_ratio"
@@ -81,8 +81,8 @@ def test_sides_are_quarters_about_the_ownship_s_course():
     edges = np.array([45.0, 135.0, 225.0, 315.0])
     sides = ["ahead", "right", "behind", "left"]
     for turn in (-360.0, 0.0, 360.0):
-        assert side_of(edges + turn - 0.1).tolist() == sides
-        assert side_of(edges + turn + 0.1).tolist() == [*sides[1:], "ahead"]
+        assert bearing_sector(edges + turn - 0.1).tolist() == sides
+        assert bearing_sector(edges + turn + 0.1).tolist() == [*sides[1:], "ahead"]
 
 
 def test_who_meets_nobody_is_of_no_class(tmp_path):

@@ -137,9 +137,9 @@ def test_coverage_is_entered_where_range_and_field_say():
         reach = limit if name == "range" else 20e3
         known = entered(reach, degrees)
         assert 0.5 < known < 5.0, name
-        found = Coverage(loaded).entered_s(0.5)["diving"]
+        found = Coverage(loaded).first_covered_s(0.5)["diving"]
         assert found == pytest.approx(known, abs=2e-3), name
-        assert Coverage(loaded).entered_s(0.5, known - 0.1) == {}  # the run ended before
+        assert Coverage(loaded).first_covered_s(0.5, known - 0.1) == {}  # the run ended before
         result = measured(scene({"radar": sensor}, 6, (crooked.DIVING,)),
                           {"metric": "tracking", "step_s": 0.25})  # fmt: skip
         # Four scans a second: the third one after the entry confirms.
@@ -149,7 +149,7 @@ def test_coverage_is_entered_where_range_and_field_say():
         ), name
         assert result["track_confirmed_share"] == 1.0
     never = load_scene(scene({"radar": {**RADAR, "range_km": 0.5}}, 3, (crooked.DIVING,)))
-    assert Coverage(never).entered_s(0.5) == {}
+    assert Coverage(never).first_covered_s(0.5) == {}
 
 
 @covers("series_s", of=("[metric tracking]",))

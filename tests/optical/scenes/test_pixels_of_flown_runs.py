@@ -68,7 +68,7 @@ def test_poses_of_frames_come_out_as_pixels_of_a_calibrated_camera():
     intruder = [np.interp(frame_s, logged_s, values) for values in flight(logged_s)[2]]
     focal, principal = (1180.0, 1175.0), (1010.0, 540.0)
     body = ned_to_body(*line_of_sight_ned(*own, *intruder), *np.radians(attitude))
-    camera = Pinhole.calibrated(focal, principal, columns=2048, rows=1024)
+    camera = Pinhole.from_intrinsics(focal, principal, columns=2048, rows=1024)
     directions = body_angles(*ned_to_body(*body, *np.radians(MOUNT_DEG)))
     column, row = camera.pixel(*directions)
     true = projected(own, attitude, intruder, MOUNT_DEG, focal, principal)
@@ -79,7 +79,7 @@ def test_poses_of_frames_come_out_as_pixels_of_a_calibrated_camera():
 
 def test_a_focal_length_of_nothing_is_refused():
     with pytest.raises(ValueError, match="focal_px is 0 and 1: both must be above 0"):
-        Pinhole.calibrated((0.0, 1.0), (5.0, 5.0), 10, 10)
+        Pinhole.from_intrinsics((0.0, 1.0), (5.0, 5.0), 10, 10)
 
 
 def test_recorded_tracks_are_a_path_in_pixels_of_a_scene(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 import components.optical.image as image
 from components.optical.flow import find_spot
-from components.optical.picture import background
+from components.optical.picture import textured_background
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.lockstep import make_lockstep_simulation
@@ -110,18 +110,18 @@ def test_texture_has_the_stated_deviation_and_grain():
     def normal(one, other):
         return stream.normal(one.astype(np.uint64), other)
 
-    here = background(normal, azimuth, elevation, grain)
+    here = textured_background(normal, azimuth, elevation, grain)
     assert abs(here.mean()) < Z / math.sqrt(n)
     assert abs(here.var() - 1.0) < Z * math.sqrt(2.0 / n)
     for part in (0.25, 0.6, 1.0):
-        there = background(normal, azimuth + part * cell, elevation, grain)
+        there = textured_background(normal, azimuth + part * cell, elevation, grain)
         expected = along(part, fine)
         # Of normal pairs, each with its own correlation.
         spread = math.sqrt((1.0 + expected**2).mean() / n)
         assert abs((here * there - expected).mean()) < Z * spread, part
-    assert abs((here * background(normal, azimuth + 2.5 * cell, elevation, grain)).mean()) < (
-        Z / math.sqrt(n)
-    )
+    assert abs(
+        (here * textured_background(normal, azimuth + 2.5 * cell, elevation, grain)).mean()
+    ) < (Z / math.sqrt(n))
 
 
 @pytest.mark.parametrize(("size", "spread", "n"), [(12, 1.01, 100_000), (16, 1.4, 20_000)])

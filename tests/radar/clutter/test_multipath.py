@@ -14,8 +14,8 @@ from wired import chain, run, sensor
 import dsa_des
 from components.terrain.reflection import (
     reflection_coefficient,
-    specular_share,
-    two_ray_factor,
+    specular_field_factor,
+    two_ray_power_factor,
 )
 from dsa_des.running.simulation import Simulation
 
@@ -101,13 +101,13 @@ def test_lobes_and_nulls_lie_where_the_ways_differ_by_half_waves():
     step_m = WAVE_M * 10e3 / (4.0 * 25.0)
     heights = step_m * np.arange(1, 7)
     keys = {"wavelength_m": WAVE_M, "permittivity": complex(1e12), "polarisation": "horizontal"}
-    found = two_ray_factor(10e3, 25.0, heights, **keys)
+    found = two_ray_power_factor(10e3, 25.0, heights, **keys)
     assert found[::2] == pytest.approx(16.0, rel=2e-3)
     assert found[1::2] == pytest.approx(0.0, abs=2e-3)
     # Below the first lobe an echo falls with the fourth power of the height: R^-8 in all.
-    low = two_ray_factor([10e3, 20e3], 25.0, 0.02 * step_m, **keys)
+    low = two_ray_power_factor([10e3, 20e3], 25.0, 0.02 * step_m, **keys)
     assert low[0] / low[1] == pytest.approx(16.0, rel=1e-2)
-    assert two_ray_factor(10e3, 25.0, [0.0, -3.0], **keys).tolist() == [1.0, 1.0]
+    assert two_ray_power_factor(10e3, 25.0, [0.0, -3.0], **keys).tolist() == [1.0, 1.0]
 
 
 def test_fresnel_brewster_and_rayleigh():
@@ -119,7 +119,7 @@ def test_fresnel_brewster_and_rayleigh():
     down = reflection_coefficient(math.pi / 2.0, 9.0 + 0j, "horizontal")
     assert down == pytest.approx((1.0 - 3.0) / (1.0 + 3.0))
     # Heights of λ / 8 sin ψ are rough by Rayleigh: phases a quarter of a turn apart.
-    rough = specular_share(math.radians(30.0), 0.1 / 8.0 / 0.5, 0.1)
+    rough = specular_field_factor(math.radians(30.0), 0.1 / 8.0 / 0.5, 0.1)
     assert rough == pytest.approx(math.exp(-((math.pi / 2.0) ** 2) / 2.0))
 
 

@@ -193,7 +193,7 @@ def test_a_filter_that_is_locked_to_the_ground_far_off_hears_that_below():
     )
     cells = Beside(RANGE_M)
     level = np.array([60.0]), np.zeros(1), np.zeros(1)
-    rate, _ = echo.range_rates(cells, level, np.zeros(1))
+    rate, _ = echo.range_rate_mean_and_spread(cells, level, np.zeros(1))
     others = [RANGE_M - FOLD_M, RANGE_M + FOLD_M]
     strongest = max(others, key=lambda at_m: ground_m2(at_m) / at_m**4)
     steep = math.cos(math.asin(min(HEIGHT_M / strongest, 1.0)))

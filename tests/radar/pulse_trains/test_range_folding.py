@@ -16,8 +16,8 @@ from wired import alone, chain, decided, noise_crosses, rows, run, sensor
 import dsa_des
 from components.radar.pulse_trains.ambiguity import (
     coincident_range_m,
-    decisive_share,
-    prfs_in_the_clear,
+    count_clear_prfs,
+    mth_largest_share,
     received_share,
 )
 from dsa_des.errors import SceneError
@@ -99,27 +99,27 @@ def test_three_prfs_of_7_8_and_9_cells_resolve_504():
 
 def test_the_mth_clearest_decides():
     shares = np.array([[0.9, 0.0], [0.2, 0.1], [0.5, 1.0]])
-    assert decisive_share(shares, 1).tolist() == [0.9, 1.0]
-    assert decisive_share(shares, 2).tolist() == [0.5, 0.1]
-    assert decisive_share(shares, 3).tolist() == [0.2, 0.0]
+    assert mth_largest_share(shares, 1).tolist() == [0.9, 1.0]
+    assert mth_largest_share(shares, 2).tolist() == [0.5, 0.1]
+    assert mth_largest_share(shares, 3).tolist() == [0.2, 0.0]
 
 
 def test_blind_zones_are_pulses_and_multiples_of_the_blind_speed():
     """10 GHz, 10 kHz: blind speed 149.9 m/s, ambiguous at 14.99 km; 1 us is 150 m."""
     keys = {"pulse_width_s": 1e-6, "wavelength_m": C / 10e9, "notch_m_s": 15.0}
     ranges = [100.0, 200.0, 14_900.0, 14_800.0, 15_100.0, 15_200.0]
-    found = prfs_in_the_clear(ranges, 60.0, prfs_hz=[10e3], **keys)
+    found = count_clear_prfs(ranges, 60.0, prfs_hz=[10e3], **keys)
     assert found.tolist() == [0, 1, 0, 1, 0, 1]
     rates = [0.0, 14.0, 16.0, 134.0, 136.0, 150.0, -150.0, -134.0, 165.5]
-    found = prfs_in_the_clear(5000.0, rates, prfs_hz=[10e3], **keys)
+    found = count_clear_prfs(5000.0, rates, prfs_hz=[10e3], **keys)
     assert found.tolist() == [0, 0, 1, 1, 0, 0, 0, 1, 1]
-    assert prfs_in_the_clear(5000.0, 150.0, prfs_hz=[10e3, 11e3, 13e3], **keys) == 1
-    half = prfs_in_the_clear([70.0, 80.0], 60.0, prfs_hz=[10e3], least_share=0.5, **keys)
+    assert count_clear_prfs(5000.0, 150.0, prfs_hz=[10e3, 11e3, 13e3], **keys) == 1
+    half = count_clear_prfs([70.0, 80.0], 60.0, prfs_hz=[10e3], least_share=0.5, **keys)
     assert half.tolist() == [0, 1]
     # Of all delays and rates that are equally likely.
     middle = (np.arange(1000) + 0.5) / 1000
     all_m, all_m_s = middle[:, np.newaxis] * C / 2e4, middle * C / 10e9 / 2 * 10e3
-    seen = prfs_in_the_clear(all_m, all_m_s, prfs_hz=[10e3], **keys)
+    seen = count_clear_prfs(all_m, all_m_s, prfs_hz=[10e3], **keys)
     clear = (1.0 - 2.0 * 1e-6 * 10e3) * (1.0 - 2.0 * 15.0 / (C / 10e9 / 2 * 10e3))
     assert seen.mean() == pytest.approx(clear, abs=2e-3)
 

@@ -220,7 +220,10 @@ def test_over_targets_the_echo_of_scatterers_is_gaussian(seed):
     aspect = np.random.default_rng(seed).normal(size=(3, len(keys)))
     aspect /= np.linalg.norm(aspect, axis=0)
     scatterers = Scatterers(Stream(seed, "radar", "scatterers"), 6.0, 0.0086)
-    parts = [*scatterers.echo(keys, tuple(aspect), 0), *scatterers.echo(keys, tuple(aspect), 1)]
+    parts = [
+        *scatterers.echo_amplitudes(keys, tuple(aspect), 0),
+        *scatterers.echo_amplitudes(keys, tuple(aspect), 1),
+    ]
     for count in (2, 4):
         found = fading_power(parts[:count])
         assert kstest(found, gamma(count / 2, scale=2 / count).cdf).pvalue > 0.01

@@ -15,7 +15,7 @@ from scipy.integrate import quad
 from wired import chain, first_look, noise_crosses, run, sensor
 
 import dsa_des
-from components.atmosphere.rain_echo import fall_speed_m_s, rain_spread_m_s
+from components.atmosphere.rain_echo import fall_speed_m_s, rain_velocity_deviation_m_s
 from components.radar.rain import RainEcho
 from dsa_des.errors import SceneError
 from dsa_des.running.reports import notes_of_scene
@@ -250,7 +250,7 @@ def test_rain_spreads_by_how_fast_it_passes_the_radar_across_its_sight():
     azimuth, elevation = np.radians([12.0, 75.0, -160.0]), np.radians([3.0, -8.0, 20.0])
     range_m = np.array([900.0, 4000.0, 2500.0])
     cells = SimpleNamespace(range_m=range_m, azimuth_rad=azimuth, elevation_rad=elevation)
-    mean, spread = rain.range_rates(cells, own_m_s, np.zeros(3))
+    mean, spread = rain.range_rate_mean_and_spread(cells, own_m_s, np.zeros(3))
     towards = math.radians(from_deg + 180.0)
     fall_m_s = fall_speed_m_s(RATE_MM_H)
     past = np.subtract([wind_mps * math.cos(towards), wind_mps * math.sin(towards), fall_m_s],
@@ -260,15 +260,17 @@ def test_rain_spreads_by_how_fast_it_passes_the_radar_across_its_sight():
     np.testing.assert_allclose(mean, past @ sight, rtol=1e-12)
     across = np.linalg.norm(np.cross(past, sight.T), axis=1)
     gaussian = math.radians(AZIMUTH_DEG) / math.sqrt(16.0 * math.log(2.0))
-    own = rain_spread_m_s(range_m, elevation, math.radians(ELEVATION_DEG))
+    own = rain_velocity_deviation_m_s(range_m, elevation, math.radians(ELEVATION_DEG))
     np.testing.assert_allclose(spread, np.hypot(own, gaussian * across), rtol=0.01)
 
 
 def test_rain_s_own_rates_spread_by_turbulence_fall_and_at_most_6_m_s_of_shear():
     """Nathanson, "Radar design principles", chapter 6."""
-    assert rain_spread_m_s(0.0, 0.0, 0.05) == pytest.approx(1.0)
-    assert rain_spread_m_s(0.0, math.radians(90.0), 0.05) == pytest.approx(math.sqrt(2.0))
-    assert rain_spread_m_s(9e5, 0.0, 0.05) == pytest.approx(math.sqrt(37.0))
+    assert rain_velocity_deviation_m_s(0.0, 0.0, 0.05) == pytest.approx(1.0)
+    assert rain_velocity_deviation_m_s(0.0, math.radians(90.0), 0.05) == pytest.approx(
+        math.sqrt(2.0)
+    )
+    assert rain_velocity_deviation_m_s(9e5, 0.0, 0.05) == pytest.approx(math.sqrt(37.0))
 
 
 @covers("beam_shape_loss", "beam_spacing", of=LINK_BUDGETS)

@@ -103,7 +103,7 @@ def test_rain_falls_below_its_top(polarisation, balance):
         other_m = crooked.geodetic(crooked.position(target))[2]
         sine = (other_m - own_m) / range_m
         tilt = (1.0 - sine * sine) * balance
-        db_km = float(rain.specific_attenuation(np.array([12.0]), np.array([tilt]))[0])
+        db_km = float(rain.specific_attenuation_db_km(np.array([12.0]), np.array([tilt]))[0])
         expected = 2.0 * share * db_km * range_m / 1000.0
         assert dry[name]["snr_db"] - wet[name]["snr_db"] == pytest.approx(expected, rel=1e-5)
 
@@ -117,7 +117,7 @@ def test_attenuations_add_and_follow_the_radar_s_own_carrier():
         dry = first_look(chain(sensors), name)["diving"]["snr_db"]
         wet = first_look(chain(sensors, weather=weather), name)["diving"]["snr_db"]
         rain = rain_coefficients(FREQUENCY_HZ * factor)
-        db_km = float(rain.specific_attenuation(np.array([8.0]), np.zeros(1))[0])
+        db_km = float(rain.specific_attenuation_db_km(np.array([8.0]), np.zeros(1))[0])
         expected = 2.0 * db_km * np.linalg.norm(crooked.ned(crooked.DIVING)) / 1000.0
         assert dry - wet == pytest.approx(expected, rel=1e-6), name
     fog = loss_db(fog_water_g_m3=0.2, fog_top_m=9000.0)["diving"]

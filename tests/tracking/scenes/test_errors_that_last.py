@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import dsa_des
-from components.estimation.kalman import variance_of_what_is_new
+from components.estimation.kalman import equivalent_independent_variance
 from components.messages.detections import LastingError, LastingPart, SensorOffer
 from components.optical.sensors import OpticalRangeBoundary
-from components.tracking.gating import common_errors
+from components.tracking.gating import covariance_with_last_errors
 from components.tracking.rules import LastingErrors
 from docs.make.track_consistency import CASES, nees_of, scene_of_case
 from dsa_des.running.reports import notes_of_scene
@@ -61,11 +61,13 @@ def test_what_is_new_is_what_the_best_of_both_says():
     rng = np.random.default_rng(5)
     variance, spread = rng.uniform(0.2, 4.0, (2, 1, 200))
     common = rng.uniform(0.0, 0.95, (1, 200)) * np.minimum(variance, spread)
-    new = variance_of_what_is_new(variance, common, spread)[0]
+    new = equivalent_independent_variance(variance, common, spread)[0]
     for r, p, k, found in zip(variance[0], spread[0], common[0], new, strict=True):
         best = 1.0 / np.linalg.inv([[p, k], [k, r]]).sum()
         assert p * found / (p + found) == pytest.approx(best, rel=1e-9)
-    told = variance_of_what_is_new(np.array([[2.0, 2.0]]), np.array([[2.0, 0.0]]), np.ones((1, 2)))
+    told = equivalent_independent_variance(
+        np.array([[2.0, 2.0]]), np.array([[2.0, 0.0]]), np.ones((1, 2))
+    )
     assert told[0, 0] > 1e5 and told[0, 1] == 2.0  # surer than the cell it tells nothing
 
 
@@ -82,12 +84,19 @@ def test_rounding_has_in_common_at_least_what_two_looks_have(noise, moved):
     )
     one = np.zeros((1, 1))
     variance = one + 1.0 / 12.0 + noise**2
-    found = lasting.common([0], one.astype(int), variance, one + moved, one + 0.1, one)[0, 0]
+    found = lasting.covariance_with_last_errors(
+        [0], one.astype(int), variance, one + moved, one + 0.1, one
+    )[0, 0]
     real = float(np.mean(errors[0] * errors[1]))
     assert found >= real - 3e-4
     if moved == 0.0:
         assert found <= 1.65 * real + 1e-3  # pi² / 6 by the bound's making
-    assert lasting.common([0], one.astype(int), variance, one, one + np.inf, one)[0, 0] == 0.0
+    assert (
+        lasting.covariance_with_last_errors([0], one.astype(int), variance, one, one + np.inf, one)[
+            0, 0
+        ]
+        == 0.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -105,7 +114,7 @@ def test_what_errors_have_in_common_is_asked_of_sensors_whose_errors_last(error)
     lasting = LastingErrors.of(offers, ("eye", "radar"))
     assert (
         lasting.is_correlated[[0, 1, -1]].tolist() == [False, True, False]
-        and lasting.sensors == 0b10
+        and lasting.correlated_sensors_mask == 0b10
     )
 
 
@@ -137,7 +146,8 @@ def test_looks_have_in_common_what_lies_between_them_whichever_was_first():
     """2 s apart, 0.02 rad across the line on which azimuths jump, in either order: 3 s is other."""
     told = []
     lasting = SimpleNamespace(
-        is_correlated=np.array([True]), common=lambda *given: told.append(given)
+        is_correlated=np.array([True]),
+        covariance_with_last_errors=lambda *given: told.append(given),
     )
     rules = SimpleNamespace(lasting=lasting, ticks_per_s=10)
     part = SimpleNamespace(
@@ -146,7 +156,7 @@ def test_looks_have_in_common_what_lies_between_them_whichever_was_first():
     )  # fmt: skip
     scans = SimpleNamespace(source=np.zeros((3, 3), dtype=int))
     foreseen = np.array([0.01 - np.pi, 0.5, 950.0])[:, np.newaxis] * np.ones((3, 3))
-    common_errors(
+    covariance_with_last_errors(
         rules, part, np.arange(3), scans, [0, 1, 2], np.arange(3), foreseen, np.ones((3, 3))
     )
     ((_, _, _, moved, since_s, _),) = told

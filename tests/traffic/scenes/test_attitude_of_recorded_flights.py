@@ -7,11 +7,11 @@ import pymap3d
 import pytest
 from wired import chain, rows, run, sensor
 
-from components.display.terminal import attitude_lines
+from components.display.terminal import derived_attitude_lines
 from components.flights.attitude import attitude_from_path, fit_path
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
-from components.traffic.recorded import derived_attitude
+from components.traffic.recorded import derived_attitude_report
 
 KNOT, FOOT = 1852 / 3600, 0.3048
 
@@ -107,16 +107,16 @@ def test_a_heading_in_radians_and_in_an_offset_file(tmp_path):
 
 
 def test_the_summary_says_what_was_derived_and_how_wrong_it_is(tmp_path):
-    without = derived_attitude(read_daa(write(tmp_path, flights(heading="spare"))))
+    without = derived_attitude_report(read_daa(write(tmp_path, flights(heading="spare"))))
     assert without["yaw"] == without["roll"] == ["own", "it"]
-    (line,) = attitude_lines({"derived_attitude": without})
+    (line,) = derived_attitude_lines({"derived_attitude": without})
     assert "own, it" in line and "4.2°" in line and "yaw, pitch, roll" in line
-    measured = derived_attitude(read_daa(write(tmp_path, flights())))
-    (line,) = attitude_lines({"derived_attitude": measured})
+    measured = derived_attitude_report(read_daa(write(tmp_path, flights())))
+    (line,) = derived_attitude_lines({"derived_attitude": measured})
     assert "pitch, roll" in line and "yaw" not in line and "4.2" not in line
     csv = "time,id,lat,lon,alt,heading,pitch,roll\n0,a,1,2,3,4,5,6\n0,b,1,2.1,3,4,5,6\n"
-    assert derived_attitude(read_csv(write(tmp_path, csv, "f.csv"))) == {}
-    assert attitude_lines({}) == []
+    assert derived_attitude_report(read_csv(write(tmp_path, csv, "f.csv"))) == {}
+    assert derived_attitude_lines({}) == []
 
 
 def test_a_run_of_recorded_flights_prints_it(tmp_path, configs, capsys):

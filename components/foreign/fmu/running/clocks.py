@@ -9,7 +9,7 @@ from components.foreign.fmu.running.values import FmuFailure
 
 
 class Clocks:
-    """The input clocks of an instance, and which of its own have ticked.
+    """The input clocks of an FMU instance, and which of its output clocks have ticked.
 
     Instants are ticks of the scene.
 
@@ -31,7 +31,7 @@ class Clocks:
         self._activate: Any = None
 
     def next_ticks(self, after: int) -> dict[int, int]:
-        """Return when each clock of a co-simulation FMU ticks next after an instant."""
+        """Return each input clock's next tick after a given one, by number (co-simulation)."""
         found = dict(self.pending)
         for number, clock in enumerate(self._clocks):
             if clock["interval"]:
@@ -44,28 +44,28 @@ class Clocks:
         return found
 
     def pop_ticking_clocks(self, after: int, at: int) -> list[int]:
-        """Return the clocks that tick after one instant up to another; they no longer wait to."""
+        """Return the numbers of clocks ticking in (one tick, another], and discard the ticks."""
         due = [number for number, tick in self.next_ticks(after).items() if tick <= at]
         self.pending = {number: tick for number, tick in self.pending.items() if tick > at}
         return due
 
-    def let_tick(self, due: Sequence[int]) -> None:
-        """Tick the input clocks that are due, in event mode."""
+    def tick_clocks(self, due: Sequence[int]) -> None:
+        """Make the given input clocks of the FMU tick; it must be in event mode."""
         references = [self._clocks[number]["reference"] for number in due]
         self._of.fmu.setClock(references, [True] * len(references))
 
-    def count_raised(self, raised: Any) -> None:
-        """Add to `raised` which of its own clocks tick now, in event mode."""
+    def add_output_ticks(self, raised: Any) -> None:
+        """Add to ``raised`` which of the FMU's output clocks tick now; it must be in event mode."""
         if self._outputs and raised is not None:
             raised += self._of.fmu.getClock(self._outputs)
 
-    def activate(self, due: Sequence[int], tick: int, per_s: int, raised: Any) -> None:
-        """Activate the partitions of a scheduled FMU that are due up to an instant.
+    def activate_partitions(self, due: Sequence[int], tick: int, per_s: int, raised: Any) -> None:
+        """Run the partitions of a scheduled FMU whose clocks are due up to a tick.
 
         In order of time and priority.
         """
         if self._activate is None:
-            self._activate = self._of.function("fmi3ActivateModelPartition")
+            self._activate = self._of.library_function("fmi3ActivateModelPartition")
             self._activate.argtypes = [c.c_void_p, c.c_uint32, c.c_double]
         waiting = [(tick, self._clocks[number]["priority"], number) for number in due]
         while True:
@@ -82,13 +82,13 @@ class Clocks:
             reference = self._clocks[number]["reference"]
             status = self._activate(self._of.component, reference, at / per_s)
             if status > 1:
-                self._of.refuse("fmi3ActivateModelPartition", status)
+                self._of.raise_failure("fmi3ActivateModelPartition", status)
             for place, output in enumerate(self._outputs):
                 raised[place] += self._of.fmu.getClock([output])[0]
-            self.count_down(at, per_s)
+            self.update_pending_ticks(at, per_s)
 
-    def count_down(self, now: int, per_s: int) -> None:
-        """Update when each clock with an interval set by the FMU ticks next."""
+    def update_pending_ticks(self, now: int, per_s: int) -> None:
+        """Ask the FMU for the intervals it sets, and store when each such clock ticks next."""
         for number, clock in enumerate(self._clocks):
             if not clock["asked"]:
                 continue

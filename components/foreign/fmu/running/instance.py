@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 
 from components.foreign.fmu.running.clocks import Clocks
-from components.foreign.fmu.running.values import FmuFailure, ValueGroup, refusal
+from components.foreign.fmu.running.values import FmuFailure, ValueGroup, make_failure
 
 _EXACT = 2**53
 
 
 class Instance:
-    """One FMU instance, its communication points, and the states it was saved in."""
+    """One FMU instance, which steps between communication points and keeps saved states."""
 
     def __init__(self, folder: str, spec: dict[str, Any]) -> None:
         from fmpy import fmi2, fmi3
@@ -43,7 +43,7 @@ class Instance:
                 options |= {"eventModeUsed": spec["events"], "earlyReturnAllowed": spec["events"]}
         else:
             calls = fmi2.fmi2CallbackFunctions()
-            calls.logger = fmi2.fmi2CallbackLoggerTYPE(self._logged2)
+            calls.logger = fmi2.fmi2CallbackLoggerTYPE(self._keep_log2)
             calls.allocateMemory = fmi2.defaultCallbacks.allocateMemory
             calls.freeMemory = fmi2.defaultCallbacks.freeMemory
             try:
@@ -64,9 +64,9 @@ class Instance:
         self.tick = 0
         self.next_event_s = math.inf  # when it wants an event
         self.clocks = Clocks(self, spec["clocks"], spec["raised"])
-        self._groups()
+        self._make_value_groups()
 
-    def _groups(self) -> None:
+    def _make_value_groups(self) -> None:
         spec = self.spec
         kinds = [(kind, [tuple(v) for v in variables]) for kind, variables in spec["outputs"]]
         self.numbers = [
@@ -75,12 +75,12 @@ class Instance:
         self.texts = [ValueGroup(self, k, v, "Get") for k, v in kinds if k in ("String", "Binary")]
         self.setters = [(ValueGroup(self, kind, v, "Set"), kind) for kind, v in spec["inputs"]]
         if not self.three:
-            function = self.function("fmi2DoStep")
+            function = self.library_function("fmi2DoStep")
             function.argtypes = [c.c_void_p, c.c_double, c.c_double, c.c_int]
             self._do_step = function
         elif spec["kind"] == "cs":
             self._flags: Any = [c.c_bool(), c.c_bool(), c.c_bool(), c.c_double()]
-            function = self.function("fmi3DoStep")
+            function = self.library_function("fmi3DoStep")
             pointer = c.c_void_p
             function.argtypes = [
                 pointer, c.c_double, c.c_double, c.c_bool, pointer, pointer, pointer, pointer
@@ -88,8 +88,8 @@ class Instance:
             self._pointers = [c.addressof(flag) for flag in self._flags]
             self._do_step = function
 
-    def function(self, name: str) -> Any:
-        """Return a function of the FMU's library, without the checks of arguments."""
+    def library_function(self, name: str) -> Any:
+        """Return a C function of the FMU's library, called without checks of its arguments."""
         if name not in self._functions:
             try:
                 found = getattr(self.fmu.dll, name)
@@ -102,21 +102,21 @@ class Instance:
     def _keep_log(self, _: Any, status: int, category: bytes, message: bytes) -> None:
         self.log.append(message.decode(errors="replace").strip())
 
-    def _logged2(self, _: Any, __: Any, status: int, category: bytes, message: bytes) -> None:
+    def _keep_log2(self, _: Any, __: Any, status: int, category: bytes, message: bytes) -> None:
         self.log.append(message.decode(errors="replace").strip())
 
     def words(self) -> str:
-        """Return the FMU's last log messages, to be added to an error."""
+        """Return the FMU's last log messages as text to be added to an error, empty without any."""
         return f": {' | '.join(list(self.log)[-3:])}" if self.log else ""
 
-    def refuse(self, call: str, status: int) -> None:
-        """Raise what the FMU answered, with what it logged."""
-        raise refusal(call, status, self.words())
+    def raise_failure(self, call: str, status: int) -> None:
+        """Raise an `FmuFailure` for a call's bad status, with the FMU's last log messages."""
+        raise make_failure(call, status, self.words())
 
     # -- the life of an instance ---------------------------------------------------------------
 
     def start(self, time_s: float, first: Any) -> None:
-        """Initialize it at a time, with its start values and the first inputs."""
+        """Initialize the instance at a time (s) with its start values and first inputs."""
         spec, fmu = self.spec, self.fmu
         structural = [start for start in spec["start"] if start[3]]
         if structural:
@@ -135,10 +135,12 @@ class Instance:
 
     def _set_starts(self, starts: Any) -> None:
         for kind, reference, values, _ in starts:
-            ValueGroup(self, kind, [(reference, len(values))], "Set").put(values)
+            ValueGroup(self, kind, [(reference, len(values))], "Set").set_values(values)
 
-    def _events(self, inputs: Any = None, due: Sequence[int] = (), raised: Any = None) -> None:
-        """Process an event of the FMU in event mode: set new inputs and tick clocks.
+    def _process_events(
+        self, inputs: Any = None, due: Sequence[int] = (), raised: Any = None
+    ) -> None:
+        """Process events in event mode: set inputs, tick clocks, update until states settle.
 
         What of its own clocks ticks is added to `raised`.
         """
@@ -146,9 +148,9 @@ class Instance:
         if inputs is not None:
             self._put_inputs(inputs)
         if due:
-            self.clocks.let_tick(due)
+            self.clocks.tick_clocks(due)
         for _ in range(1000):
-            self.clocks.count_raised(raised)
+            self.clocks.add_output_ticks(raised)
             again, ended, _, _, defined, next_s = fmu.updateDiscreteStates()
             self.ended = self.ended or ended
             if not again:
@@ -163,28 +165,28 @@ class Instance:
             group.exchange()
             at += group.count
 
-    def _exchange(
+    def _set_inputs_and_tick(
         self, inputs: Any, due: Sequence[int], tick: int, per_s: int, raised: Any
     ) -> None:
-        """Set new inputs of the FMU, if any, and tick the clocks that are due."""
+        """Set new inputs, if any, and tick the clocks due, in event mode where the FMU has one."""
         if self.spec["events"] and (due or (inputs is not None and self.spec["discrete"])):
             self.fmu.enterEventMode()
-            self._events(inputs, due, raised)
+            self._process_events(inputs, due, raised)
             self._leave_event_mode(tick, per_s)
         elif inputs is not None:
             self._put_inputs(inputs)
 
     def _leave_event_mode(self, tick: int, per_s: int) -> None:
-        self.clocks.count_down(tick, per_s)
+        self.clocks.update_pending_ticks(tick, per_s)
         self.fmu.enterStepMode()
 
     def step(self, start_s: float, end_s: float, raised: Any = None) -> bool:
-        """Go from one communication point to the next; return whether it got there.
+        """Advance to the next communication point; return whether the FMU did not end before.
 
         Events on the way are handled. It may ask to end before, or there (`ended`).
         """
         if not self.three:
-            return self._step2(start_s, end_s)
+            return self._step_fmi2(start_s, end_s)
         event, ended, early, last = self._flags
         for _ in range(1_000_000):
             to_s = self.next_event_s if start_s < self.next_event_s < end_s else end_s
@@ -192,12 +194,12 @@ class Instance:
             forward = self.only_forward
             status = self._do_step(self.component, start_s, size, forward, *self._pointers)
             if status > 1:
-                self.refuse("fmi3DoStep", status)
+                self.raise_failure("fmi3DoStep", status)
             self.ended = self.ended or ended.value
             there_s = min(last.value, to_s) if early.value else to_s
             if (event.value or there_s >= self.next_event_s) and not ended.value:
                 self.next_event_s = math.inf
-                self._event_on_the_way(there_s, raised)
+                self._handle_event_at(there_s, raised)
             if self.ended:
                 return end_s - there_s <= 1e-9 * max(1.0, abs(end_s))
             if there_s >= end_s:
@@ -205,28 +207,27 @@ class Instance:
             start_s = there_s
         raise FmuFailure("it returned early from a step 1000000 times")
 
-    def _event_on_the_way(self, now_s: float, raised: Any) -> None:
+    def _handle_event_at(self, now_s: float, raised: Any) -> None:
         if not self.spec["events"]:
             return
         self.fmu.enterEventMode()
-        self._events(raised=raised)
+        self._process_events(raised=raised)
         self._leave_event_mode(round(now_s * self.per_s), self.per_s)
 
-    def _step2(self, start_s: float, end_s: float) -> bool:
+    def _step_fmi2(self, start_s: float, end_s: float) -> bool:
         status = self._do_step(self.component, start_s, end_s - start_s, self.only_forward)
         if status == 2 and self.fmu.getBooleanStatus(3):
             self.ended = True
             last: float = self.fmu.getRealStatus(2)
             return end_s - last <= 1e-9 * max(1.0, abs(end_s))
         if status > 1:
-            self.refuse("fmi2DoStep", status)
+            self.raise_failure("fmi2DoStep", status)
         return True
 
     # -- clocks --------------------------------------------------------------------------------
 
     def _step_to(self, before: int, tick: int, per_s: int, raised: Any) -> bool:
-        """Step to an instant, letting clocks tick at their own on the way; return whether it got
-        there.
+        """Advance to a tick, ticking clocks at their own times; return whether it was reached.
 
         Those that tick at the instant itself are left to whoever gives it its inputs there.
         """
@@ -237,13 +238,13 @@ class Instance:
             if at == tick or self.ended:
                 return at == tick
             due = self.clocks.pop_ticking_clocks(before, at)
-            self._exchange(None, due, at, per_s, raised)
+            self._set_inputs_and_tick(None, due, at, per_s, raised)
             before = at
 
     # -- going back ----------------------------------------------------------------------------
 
     def restore_slot(self, slot: int, freed: list[int]) -> None:
-        """Restore a saved state; 0 is the one before it started."""
+        """Restore a saved state by number (0: before the start), and free those in ``freed``."""
         if slot != self.slot:
             if slot == 0:
                 self.fmu.reset()
@@ -259,7 +260,7 @@ class Instance:
                 self.fmu.freeFMUState(self.saved.pop(old)[0])
 
     def save(self) -> int:
-        """Remember its state; return the number it is known by."""
+        """Save the FMU's state and return the number under which it is kept."""
         self.names += 1
         state = self.fmu.getFMUState()
         kept = state, self.tick, dict(self.clocks.pending), self.ended, self.next_event_s
@@ -300,32 +301,32 @@ class Instance:
             if not self.started:
                 self.start(time_s, rows[row])
                 if scheduled:
-                    self.clocks.count_down(tick, per_s)
+                    self.clocks.update_pending_ticks(tick, per_s)
                 elif self.spec["events"]:
                     due_now = (
                         [*due[row], *self.clocks.pop_ticking_clocks(tick - 1, tick)]
                         if clocked
                         else ()
                     )
-                    self._events(None, due_now, raised[row])
+                    self._process_events(None, due_now, raised[row])
                     self._leave_event_mode(tick, per_s)
             elif clocked:
                 if not self._step_to(self.tick, tick, per_s, raised[row]):
                     done = row
                     break
                 now_due = [*due[row], *self.clocks.pop_ticking_clocks(tick - 1, tick)]
-                self._exchange(rows[row] if changed[row] else None, now_due, tick, per_s,
+                self._set_inputs_and_tick(rows[row] if changed[row] else None, now_due, tick, per_s,
                                raised[row])  # fmt: skip
             elif not scheduled:
                 if not step(before, time_s, raised[row]):
                     done = row
                     break
                 if changed[row]:
-                    self._exchange(rows[row], (), tick, per_s, raised[row])
+                    self._set_inputs_and_tick(rows[row], (), tick, per_s, raised[row])
             if scheduled:
                 if changed[row]:
                     self._put_inputs(rows[row])
-                self.clocks.activate(due[row], tick, per_s, raised[row])
+                self.clocks.activate_partitions(due[row], tick, per_s, raised[row])
             before, self.tick = time_s, tick
             for exchange, values, place in places:
                 exchange()

@@ -24,8 +24,8 @@ class FmuFailure(Exception):
     """What an FMU refused, in its own words."""
 
 
-def refusal(call: str, status: int, words: str) -> FmuFailure:
-    """Return the error of a function that returned a status, with what was logged."""
+def make_failure(call: str, status: int, words: str) -> FmuFailure:
+    """Return the error for a call that returned a bad status, with the given log text."""
     return FmuFailure(f"{call} returned {_STATUS[min(status, 5)]}{words}")
 
 
@@ -49,7 +49,7 @@ class ValueGroup:
         references = [reference for reference, _ in variables]
         self.count = sum(size for _, size in variables)
         self.references: Any = (c.c_uint32 * len(references))(*references)
-        self._function = fmu.function(self.call)
+        self._function = fmu.library_function(self.call)
         if kind == "Binary":
             self.sizes = (c.c_size_t * self.count)()
             self.buffer: Any = (c.POINTER(c.c_uint8) * self.count)()
@@ -63,13 +63,13 @@ class ValueGroup:
         self._arguments = (*head, *middle, self.buffer, *tail)
 
     def exchange(self) -> None:
-        """Call the FMU on the buffer."""
+        """Call the FMU's Get or Set, which fills the buffer or takes the values from it."""
         status = self._function(*self._arguments)
         if status > 1:
-            self.fmu.refuse(self.call, status)
+            self.fmu.raise_failure(self.call, status)
 
-    def put(self, values: Any) -> None:
-        """Set text, or numbers, that stay the same."""
+    def set_values(self, values: Any) -> None:
+        """Set the variables to the given texts or numbers at once."""
         if self.kind == "Binary":
             kept = [(c.c_uint8 * len(value)).from_buffer_copy(value) for value in values]
             for place, item in enumerate(kept):
@@ -83,7 +83,7 @@ class ValueGroup:
         self.exchange()
 
     def words(self) -> list[str]:
-        """Return the text that was read; bytes as hexadecimal digits."""
+        """Return the texts that were read, bytes as hexadecimal digits."""
         if self.kind == "Binary":
             return [c.string_at(p, n).hex() for p, n in zip(self.buffer, self.sizes, strict=True)]
         return [(value or b"").decode(errors="replace") for value in self.buffer]

@@ -18,7 +18,7 @@ _MOST_WORDS = 1_000_000
 
 
 def serve(folder: str) -> None:
-    """Serve requests until there are no more; `folder` is the process's own."""
+    """Answer requests on standard input to its end, then exit; ``folder`` is the process's own."""
     requests = os.fdopen(os.dup(0), "rb")
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what an FMU prints is no answer

@@ -49,7 +49,7 @@ def few():
 def test_all_nmacs_are_flown_and_some_of_the_others_weigh_as_much(few):
     pairs, hit = few
     known = read_model(MODELS / "light_aircraft.txt")
-    every = PairSampler(known, known, 1, PairingRules()).pairs(range(300))
+    every = PairSampler(known, known, 1, PairingRules()).sample_pairs(range(300))
     nmac, lost = violates(VOLUMES["nmac"], every), violates(eyes._LOST, every)
     assert sum(len(some.weight) for some in hit) == nmac.sum() > 4
     assert violates(VOLUMES["nmac"], pairs).sum() == nmac.sum()

@@ -10,7 +10,7 @@ import dsa_des
 from components.encounters.model_file import read_model
 from components.encounters.pair_densities import PairingRules
 from components.encounters.pairing import Pairs, PairSampler
-from components.visual.acquisition import VISUAL_RANGE_DEPTH, closing_opportunity
+from components.visual.acquisition import VISUAL_RANGE_DEPTH, integrated_acquisition_rate
 from docs.make.published import eyes
 from docs.make.published.seen_in_time import Eyes, opportunity, unseen
 from docs.make.published.volumes import MODELS
@@ -47,7 +47,7 @@ def test_head_on_it_is_the_closed_form():
     found = opportunity(pairs, BALL, 0)
     extinction = VISUAL_RANGE_DEPTH / (20.0 * 1852.0)
     for second in (20, 60, 90):
-        expected = closing_opportunity(
+        expected = integrated_acquisition_rate(
             12.0, 500.0 * FOOT_M, from_m=60000.0 * FOOT_M,
             to_m=(60000.0 - 500.0 * second) * FOOT_M, extinction_per_m=extinction,
         )  # fmt: skip
@@ -90,7 +90,7 @@ def test_an_aircraft_that_is_too_small_or_out_of_view_is_not_seen():
 
 def test_the_block_has_as_much_in_flights_that_turn(tmp_path):
     known = read_model(MODELS / "light_aircraft.txt")
-    pairs = PairSampler(known, known, 1, PairingRules()).pairs(range(120))
+    pairs = PairSampler(known, known, 1, PairingRules()).sample_pairs(range(120))
     turning = np.abs(pairs.turn_rad_s[0, :140]).mean(axis=0)
     seen = opportunity(pairs, Eyes(), 0)
     some = pairs.take(np.argsort(-np.where(seen[140] > 0.3, turning, 0.0))[:3])

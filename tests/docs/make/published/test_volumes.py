@@ -33,7 +33,7 @@ COUNT = 300
 @pytest.fixture(scope="module")
 def pairs():
     sampler = PairSampler(read_model(UNCREWED), read_model(CREWED), 0, PairingRules())
-    return sampler.pairs(range(COUNT))
+    return sampler.sample_pairs(range(COUNT))
 
 
 def looked_at(pairs, radius_ft, half_ft, factor):
@@ -81,7 +81,7 @@ def test_the_uncrewed_aircraft_flies_straight_and_level_at_its_speeds(tmp_path, 
     assert np.ptp(speed_kt, axis=0).max() < 1e-9
     assert np.ptp(pairs.up_ft[0], axis=0).max() == np.ptp(pairs.heading_rad[0], axis=0).max() == 0.0
     fast = PairSampler(read_model(uncrewed_at(tmp_path, "80 120")), read_model(CREWED), 0, EVEN)
-    some = fast.pairs(range(20))
+    some = fast.sample_pairs(range(20))
     assert some.speed_ft_s[0].min() / 1.687810 >= 80.0
     # Drawn alike, weights differ by the speeds of the two alone.
     assert some.weight.max() / some.weight.min() < 4.0

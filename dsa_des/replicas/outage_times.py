@@ -15,7 +15,7 @@ from dsa_des.scene.changes import TimedChange
 from dsa_des.scene.scene import Scene
 from dsa_des.stretches.outages import Outages, merge_spans
 from dsa_des.time.randomness import Streams
-from dsa_des.time.runs import Runs
+from dsa_des.time.timeline_runs import Runs
 
 #: By block, of every run: from and to, s, (spans, 2), in order.
 TimesOut = Mapping[str, list[FloatArray]]
@@ -24,13 +24,13 @@ _ENABLED = "enabled"
 
 
 def blocks_with_outages(scene: Scene) -> list[str]:
-    """Return the blocks that fail at random or that changes switch on or off, sorted."""
+    """Return, sorted, the blocks that fail at random or that changes switch on or off."""
     names = {name for one in scene.outages for name in one.blocks}
     return sorted(names.union(*(map(_switched_blocks, scene.changes))))
 
 
 def outage_times_of_seeds(scene: Scene, seeds: Sequence[int], ends_s: FloatArray) -> TimesOut:
-    """Return when blocks that may be out are, in each run.
+    """Return block → per run the (from, to) outage times, s, as an array (spans, 2).
 
     Runs differ in seeds and in when they end.
     """
@@ -54,7 +54,7 @@ def outage_times_of_seeds(scene: Scene, seeds: Sequence[int], ends_s: FloatArray
         ).reshape(-1, 2)
         result[name] = []
         for run, end in enumerate(ends.tolist()):
-            parts = [off] if drawn is None else [off, drawn.spans(run)]
+            parts = [off] if drawn is None else [off, drawn.outage_spans(run)]
             result[name].append(merge_spans(np.concatenate(parts), end) / per_s)
     return result
 
@@ -62,7 +62,7 @@ def outage_times_of_seeds(scene: Scene, seeds: Sequence[int], ends_s: FloatArray
 def outage_times_of_replicas(
     scene: Scene, replicas: Sequence[Replica], ends_s: FloatArray
 ) -> TimesOut:
-    """Return when blocks that may be out are, in each of some replicas of a scene."""
+    """Return block → per replica the (from, to) outage times, s, as an array (spans, 2)."""
     seeds = [replica.seed for replica in replicas]
     if not any(key.endswith(".enabled") for one in replicas for key in one.changes):
         return outage_times_of_seeds(scene, seeds, ends_s)
@@ -76,15 +76,15 @@ def outage_times_of_replicas(
 
 
 def _switched_blocks(change: TimedChange) -> set[str]:
-    """Return which blocks a change switches on or off."""
+    """Return the names of the blocks that a change switches on or off."""
     blocks = (key for key in change.keys if key[0] == "blocks")
     return {str(key[1]) for key in blocks if key[2:] == (_ENABLED,)}
 
 
-def is_out_between(
+def was_out_between(
     out: TimesOut, blocks: Sequence[str], from_s: FloatArray, to_s: FloatArray
 ) -> BoolArray:
-    """Return whether any of some blocks was out between instants of replicas (replicas, n).
+    """Return a mask (replicas, n): whether any of the blocks was out in `from_s` to `to_s`.
 
     Instants are NaN where there are none, and nothing is out then.
     """

@@ -7,7 +7,7 @@ from dsa_des.errors.problems import UsageError
 
 
 def import_extra(module: str, extra: str, what: str) -> Any:
-    """Return a library of an extra; where it is missing, `UsageError` says how to install it."""
+    """Import and return an optional library; if missing, UsageError says how to install it."""
     try:
         return import_module(module)
     except ImportError as error:

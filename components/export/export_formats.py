@@ -13,11 +13,11 @@ from components.display.recorded_run import RecordedTables, read_tables
 from components.export.asterix_export import asterix_bytes
 from components.export.czml import czml_text
 from components.export.flight_files import STEP_S, daa_text, xyz_text
-from components.export.kml import kml_text, undulation_of
+from components.export.kml import kml_text, scene_undulation_m
 from components.export.mcap_export import mcap_bytes
 from components.export.operator_answers import operator_csv
 from dsa_des.errors import OutputError, UsageError
-from dsa_des.files.output_file import check_file, write_file
+from dsa_des.files.output_file import check_file_writable, write_file
 from dsa_des.files.output_names import user_path
 from dsa_des.terminal.terminal import say
 
@@ -45,13 +45,13 @@ def export_run(
     if to == "csv":
         _write_folder(tables, target if out is not None else folder.with_name(f"{folder.name}-csv"))
         return
-    check_file(target)
+    check_file_writable(target)
     said = ""
     if to in _ONLY_OF["step_s"]:
         text = daa_text if to == "daa" else xyz_text
         content = text(tables, STEP_S if step_s is None else step_s).encode("utf-8")
     elif to == "kml":
-        said, geoid_m = _geoid(tables, geoid_m)
+        said, geoid_m = _geoid_note_and_height_m(tables, geoid_m)
         content = kml_text(tables, geoid_m).encode("utf-8")
     else:
         content = _OF_ONE_FILE[to](tables)
@@ -77,9 +77,11 @@ def _check_options(to: str, **given: float | None) -> None:
             raise UsageError(f"{option} {value:g}: the geoid is within ±{_MOST_GEOID_M:g} m")
 
 
-def _geoid(tables: RecordedTables, given_m: float | None) -> tuple[str, float]:
-    """Return the geoid's height above the ellipsoid, and a note on it."""
-    known_m = undulation_of(tables)
+def _geoid_note_and_height_m(tables: RecordedTables, given_m: float | None) -> tuple[str, float]:
+    """Return a note on where the geoid's height comes from (empty if it was given), and that height
+    above the ellipsoid in m.
+    """
+    known_m = scene_undulation_m(tables)
     if given_m is not None:
         said, geoid_m = "", given_m
     elif known_m is not None:
@@ -104,19 +106,19 @@ def _write_folder(tables: RecordedTables, target: Path) -> None:
 
 
 def csv_files(run: RecordedTables) -> dict[str, bytes]:
-    """Return a CSV file for each table; what is not measured is an empty cell."""
+    """Return each table's CSV file contents, by file name; missing values are empty cells."""
     import pyarrow.csv as pa_csv
 
     result = {}
     for name, table in run.tables.items():
         stream = io.BytesIO()
-        pa_csv.write_csv(_plain(table), stream)
+        pa_csv.write_csv(_decode_dictionaries(table), stream)
         result[f"{name}.csv"] = stream.getvalue()
     return result
 
 
-def _plain(table: Any) -> Any:
-    """Return a table without dictionaries, which CSV does not know."""
+def _decode_dictionaries(table: Any) -> Any:
+    """Return an Arrow table with dictionary-encoded columns made plain, as CSV needs them."""
     import pyarrow as pa
 
     columns = [

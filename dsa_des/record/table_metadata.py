@@ -36,8 +36,8 @@ class Notes:
     meanings: Mapping[str, Mapping[str, Column]]
     rows_of: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
-    def schema(self, table: str, schema: "pa.Schema") -> "pa.Schema":
-        """Return the schema of a table with metadata of the run, and of each column."""
+    def with_metadata(self, table: str, schema: "pa.Schema") -> "pa.Schema":
+        """Return an Arrow schema with metadata on the run and columns (unit, frame, meaning)."""
         import pyarrow as pa
 
         described, rows_of = self.meanings.get(table, {}), self.rows_of.get(table, {})
@@ -50,31 +50,31 @@ class Notes:
             fields.append(item.with_metadata(said) if said else item)
         return pa.schema(fields, metadata={"table": table, **self.run})
 
-    def of_file(self, table: str, schema: "pa.Schema") -> dict[str, str]:
+    def parquet_metadata(self, table: str, schema: "pa.Schema") -> dict[str, str]:
         """Return the key-value metadata of a table's Parquet file.
 
         Beside those of the run there is Arrow's own schema, which alone has metadata by column.
         """
-        described = self.schema(table, schema)
+        described = self.with_metadata(table, schema)
         arrow = base64.b64encode(described.serialize().to_pybytes()).decode()
         return {"table": table, **self.run, "ARROW:schema": arrow}
 
     def attach(self, tables: Mapping[str, Any]) -> "dict[str, pa.Table]":
-        """Return Arrow tables with their metadata."""
+        """Return tables by name as Arrow tables with metadata on the run and each column."""
         import pyarrow as pa
 
         return {
             name: pa.Table.from_arrays(
-                list(table.itercolumns()), schema=self.schema(name, table.schema)
+                list(table.itercolumns()), schema=self.with_metadata(name, table.schema)
             )
             for name, table in tables.items()
         }
 
 
-def notes_of(
+def metadata_of_run(
     messages: Iterable[type[Message]], scene_text: str, seed: int, ticks_per_s: int
 ) -> Notes:
-    """Return what the tables of a run of these messages say, given its resolved scene."""
+    """Return the table metadata of a run with these messages and resolved `scene_text`."""
     meanings: dict[str, dict[str, Column]] = {}
     rows_of: dict[str, dict[str, str]] = {}
     for message in messages:

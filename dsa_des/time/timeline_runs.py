@@ -14,7 +14,7 @@ from dsa_des.time.clock import MAX_TICK
 
 
 class Runs:
-    """How many runs there are, how long they last, and which of them go now.
+    """How many runs there are, how long they last, and which of them are being simulated now.
 
     Parameters
     ----------
@@ -41,14 +41,14 @@ class Runs:
         self.early = False
         self.ended_by: dict[int, str] = {}
 
-    def final_before(self, tick: int, going: range) -> tuple[int, int]:
-        """Return the run, and its tick, before which no row comes, when runs are at a tick."""
+    def rows_complete_before(self, tick: int, going: range) -> tuple[int, int]:
+        """Return (run, tick) before which no further row can come, once `going` reached a tick."""
         if tick >= self.run_ticks:
             return going.stop, 0
         return going.start, tick if len(going) == 1 else 0
 
     def note_ends(self, instants: RunTicks, block: str) -> None:
-        """Take note that a block ends runs at some instants; the first counts."""
+        """Record that a block ends runs at these instants; the earliest end of a run counts."""
         for run, tick in zip(instants.run.tolist(), instants.tick.tolist(), strict=True):
             if tick < self.ends[run]:
                 self.ends[run] = tick
@@ -56,13 +56,13 @@ class Runs:
                 self.early = True
 
     def is_before_ends(self, instants: RunTicks) -> BoolArray:
-        """Return which instants lie before the ends of their runs."""
+        """Return a mask of the instants, True for those before the end of their run."""
         return np.less(instants.tick, self.ends[instants.run])
 
-    def lasting(self, runs: IntArray) -> int:
-        """Return how many of some runs are not known to end early."""
+    def count_full_length(self, runs: IntArray) -> int:
+        """Return how many of the given runs are not known to end early."""
         return int(np.count_nonzero(self.ends[runs] == self.run_ticks))
 
-    def is_over(self, tick: int) -> bool:
-        """Return whether all runs that go are over before a tick of theirs."""
+    def have_all_ended(self, tick: int) -> bool:
+        """Return whether all runs being simulated have ended early, at `tick` or before."""
         return self.early and bool((self.ends[self.going.start : self.going.stop] <= tick).all())

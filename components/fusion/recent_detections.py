@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from components.messages.detections import Detections
-from dsa_des.arrays.entries import entries_of
+from dsa_des.arrays.entries import select_entries
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.wake import Arrivals
@@ -15,7 +15,7 @@ from dsa_des.block.wake import Arrivals
 
 @dataclass(frozen=True, eq=False)
 class Recent:
-    """Recent rows of every sensor, with which later ones may still be fused."""
+    """Every sensor's recent rows, which may yet be combined, and which entries were used."""
 
     seen: Mapping[str, Arrivals] = field(default_factory=dict)
     #: By sensor, which entries of its rows and of older ones fused rows were made of, and which
@@ -26,7 +26,7 @@ class Recent:
     def add_arrivals(
         self, arrivals: Mapping[str, Arrivals], first_run: int, keep_ticks: int
     ) -> tuple[dict[str, Arrivals], Self]:
-        """Return new and recent rows of every sensor, by name, and what is recent then.
+        """Return every sensor's recent and new rows joined, and those to keep as recent.
 
         Forgotten are runs before the first one, and what came more than `keep_ticks` ago.
         """
@@ -35,7 +35,7 @@ class Recent:
             parts = []
             if (old := self.seen.get(name)) is not None:
                 going = slice(int(np.searchsorted(old.message.run, first_run)), None)
-                parts.append(_rows(old, self.used[name][self.kept[name]], going))
+                parts.append(_select_rows(old, self.used[name][self.kept[name]], going))
             if (new := arrivals.get(name)) is not None:
                 parts.append((new, np.zeros(len(new.message.target), dtype=bool)))
             together[name], used[name] = _concatenate_by_run(parts)
@@ -43,12 +43,12 @@ class Recent:
         seen, kept = {}, {}
         for name, all_seen in together.items():
             young = np.flatnonzero(all_seen.tick >= latest - keep_ticks)
-            kept[name] = entries_of(all_seen.message.offsets, young)[1]
-            seen[name], _ = _rows(all_seen, used[name], young)
+            kept[name] = select_entries(all_seen.message.offsets, young)[1]
+            seen[name], _ = _select_rows(all_seen, used[name], young)
         return together, type(self)(seen, used, kept)
 
-    def find_used(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
-        """Return which entries were used before, of what `add_arrivals` gave, one after the other.
+    def used_mask(self, arrivals: Mapping[str, Arrivals]) -> BoolArray:
+        """Return a mask over the arrivals' entries, joined, True for those fused before.
 
         Of anything else none is known to be.
         """
@@ -62,20 +62,22 @@ class Recent:
         )
 
     def mark_used(self, arrivals: Mapping[str, Arrivals], used: BoolArray) -> Self:
-        """Return what is recent once more entries are used; both are as for `used_of`."""
+        """Return the recent rows with more entries marked as used, by a `used_mask` mask."""
         ends = np.cumsum([len(one.message.target) for one in arrivals.values()])
         parts = dict(zip(arrivals, np.split(used, ends[:-1]), strict=True))
         same = {n: one for n, one in parts.items() if len(self.used.get(n, ())) == len(one)}
         return replace(self, used={**self.used, **same})
 
 
-def _rows(seen: Arrivals, used: BoolArray, rows: slice | IntArray) -> tuple[Arrivals, BoolArray]:
-    _, which = entries_of(seen.message.offsets, rows)
+def _select_rows(
+    seen: Arrivals, used: BoolArray, rows: slice | IntArray
+) -> tuple[Arrivals, BoolArray]:
+    _, which = select_entries(seen.message.offsets, rows)
     return Arrivals(seen.source, seen.instants.take(rows), seen.message.take(rows)), used[which]
 
 
 def _concatenate_by_run(parts: list[tuple[Arrivals, BoolArray]]) -> tuple[Arrivals, BoolArray]:
-    """Return the rows of one sensor, those of each run together."""
+    """Return one sensor's rows joined by run and time, and the mask of their used entries."""
     (first, used), *more = parts
     if not more:
         return first, used
@@ -85,14 +87,14 @@ def _concatenate_by_run(parts: list[tuple[Arrivals, BoolArray]]) -> tuple[Arriva
         Detections.concatenate([one.message for one, _ in parts]),
     )
     used = np.concatenate([flags for _, flags in parts])
-    order = whole.instants.order()
-    return (whole, used) if order is None else _rows(whole, used, order)
+    order = whole.instants.sort_indices()
+    return (whole, used) if order is None else _select_rows(whole, used, order)
 
 
 def split_used_rows(
     row: IntArray, parts: IntArray, made: IntArray, used: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return what of fused rows is new: rows as they are, and detections by themselves.
+    """Return which fused rows are unused and of one instant, and the others' unused detections.
 
     A tracker that took a detection twice, or two of different instants for one of one, would be
     too sure. So a fused row counts as it is if all that it is made of is new and was measured at

@@ -11,7 +11,7 @@ from wired import chain
 import dsa_des
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.replicas.times_out import outage_times_of_seeds
+from dsa_des.replicas.outage_times import outage_times_of_seeds
 from dsa_des.running.simulation import Simulation
 from dsa_des.stretches.outage import Outage
 

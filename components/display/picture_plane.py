@@ -30,7 +30,7 @@ class TangentPlane:
     def east_north_m(
         self, lat_deg: AnyArray, lon_deg: AnyArray, alt_m: AnyArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return where positions lie in the plane; NaN where they are not known."""
+        """Return east and north of positions in the plane, m; NaN where a position is not known."""
         known = np.isfinite(lat_deg) & np.isfinite(lon_deg) & np.isfinite(alt_m)
         east, north = np.full(known.shape, np.nan), np.full(known.shape, np.nan)
         if known.any():
@@ -39,8 +39,8 @@ class TangentPlane:
             )
         return east, north
 
-    def turned_rad(self, place: FloatArray | Sequence[FloatArray]) -> FloatArray:
-        """Return the direction in the plane of the north of places (latitude, longitude; deg).
+    def north_direction_rad(self, place: FloatArray | Sequence[FloatArray]) -> FloatArray:
+        """Return where other places' (deg) north points, rad clockwise from the plane's north.
 
         Far from where the plane touches the Earth it is another direction than the plane's north.
         """
@@ -53,7 +53,8 @@ class TangentPlane:
 
 
 def offset_positions(ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray]) -> FloatArray:
-    """Return latitude, longitude (deg) and altitude (m), (3, n), of offsets from origins alike.
+    """Return latitude, longitude (deg) and altitude (m), (3, n), of points offset north, east and
+    down from one origin each.
 
     NaN where the offset (3, n) north, east and down is not known.
     """
@@ -69,8 +70,8 @@ def offset_positions(ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray
     return result
 
 
-def sights(line: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return bearings of measured lines of sight, rad from north, and where they end, (3, n).
+def bearings_and_end_points(line: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return bearings of lines of sight, rad clockwise from north, and end positions (3, n).
 
     Lines (3, n) are those of `LINE`, poses (6, n) those of `POSE`, in degrees, metres and radians.
     What is not known is NaN.
@@ -93,7 +94,7 @@ def sights(line: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
-    """Return rows of ``state_tracks`` whose states have a range, and where they are.
+    """Return the indices and positions of rows of ``state_tracks`` with a range.
 
     Latitude, longitude (deg) and height above the ellipsoid (m), (3, n), at ``state_s``.
     """
@@ -105,7 +106,7 @@ def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
 
 
 def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
-    """Return one row of ``tracks`` for each held measurement with a range, and its position.
+    """Return a row index of ``tracks`` for each measurement with a held range, and its position.
 
     Places are as in `estimated_positions`, at ``measured_s``.
     """
@@ -125,11 +126,11 @@ def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     if not kept:
         return nothing
     rows = np.array(kept)
-    if run.has("tracks", POSE[0]):  # as believed, where that is recorded
+    if run.has_columns("tracks", POSE[0]):  # as believed, where that is recorded
         pose = run.stack_columns("tracks", POSE, rows)
     else:
         pose = np.empty((len(POSE), len(rows)))
-        on = run.texts("tracks", "platform") if run.has("tracks", "platform") else []
+        on = run.texts("tracks", "platform") if run.has_columns("tracks", "platform") else []
         carrying = np.array([on[row] if on else None for row in kept], dtype=object)
         for platform in {*carrying.tolist()}:
             mine = np.flatnonzero(carrying == platform)
@@ -140,4 +141,4 @@ def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
                     "was when tracks were measured: record it with truth = true under [record]"
                 )
             pose[:, mine] = true
-    return rows, sights(run.stack_columns("tracks", LINE, rows), pose)[1]
+    return rows, bearings_and_end_points(run.stack_columns("tracks", LINE, rows), pose)[1]

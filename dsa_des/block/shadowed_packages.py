@@ -18,10 +18,10 @@ from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.source_file import (
     append_to_module_path,
     file_of,
-    find_other_module,
+    find_conflicting_module,
     folders_for_module,
+    module_search_folders,
     remember_module_folder,
-    search_folders,
 )
 from dsa_des.errors import UsageError, did_you_mean
 
@@ -30,7 +30,7 @@ _HOME = Path(__file__).parents[2]
 
 
 def refuse_hidden_module(module_name: str) -> None:
-    """Raise UsageError if a module of ours, by name, would be imported from another package."""
+    """Raise UsageError if a package of the same name would hide one of our own modules."""
     top = module_name.partition(".")[0]
     ours = _HOME / top
     found = _location_of_module(top)
@@ -72,7 +72,7 @@ class NotAllowed(NotImportable):
 
 @dataclass(frozen=True)
 class Foreign:
-    """One foreign module that something names: `key`, for example ``blocks.radar.type``.
+    """A module outside this package named in a file at `key`, such as ``blocks.radar.type``.
 
     `name` is as it stands there, for example ``mine:Radar``; `file` is where it would be imported
     from, or what it is instead of a file.
@@ -86,14 +86,16 @@ class Foreign:
 
 @dataclass
 class Imports:
-    """What may be imported, and what is called with each `Foreign` before that, or instead."""
+    """Whether foreign modules may be imported, and a function that is called once with each
+    `Foreign` before it is imported or refused.
+    """
 
     allowed: bool = True
     announce: Callable[[Foreign], None] | None = None
     seen: set[Foreign] = field(default_factory=set)
 
     def announce_import(self, foreign: Foreign) -> None:
-        """Call the announcement; NotAllowed if nothing foreign may be imported."""
+        """Announce a foreign module once; NotAllowed if foreign modules may not be imported."""
         if self.announce is not None and foreign not in self.seen:
             self.seen.add(foreign)
             self.announce(foreign)
@@ -106,8 +108,8 @@ _IMPORTS: ContextVar[Imports] = ContextVar("imports", default=_ANYTHING)
 
 
 @contextlib.contextmanager
-def imports(policy: Imports) -> Iterator[Imports]:
-    """Apply a policy to all imports of what files name, meanwhile."""
+def import_policy(policy: Imports) -> Iterator[Imports]:
+    """Apply an import policy to all modules that files name, while the context lasts."""
     token = _IMPORTS.set(policy)
     try:
         yield policy
@@ -121,8 +123,12 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
     A name that knows the folder it was written in (`SourcedText`) is looked for there, too, and in
     the folders `beside`. The `key` names it, for messages.
     """
-    module_name, class_name = source_file.split_name(name)
-    path = source_file.path_of(name) if source_file.is_file(module_name) else None
+    module_name, class_name = source_file.split_type_name(name)
+    path = (
+        source_file.absolute_file_path(name)
+        if source_file.is_python_file_path(module_name)
+        else None
+    )
     if not class_name or (path is None and not all(module_name.split("."))):
         raise NotImportable("must have the form module:Class or ./file.py:Class")
     beside = (*([Path(name.folder)] if hasattr(name, "folder") else []), *beside)
@@ -145,8 +151,8 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
         raise NotImportable(f"{_folder_of_module(module)} has no {class_name!r}{hint}") from None
 
 
-def load_point(point: EntryPoint, key: str = "") -> Any:
-    """Return what an entry point names, which is announced if another package registered it.
+def load_entry_point(point: EntryPoint, key: str = "") -> Any:
+    """Import and return an entry point's object; with `key`, announce foreign ones first.
 
     Raises NotImportable if it cannot be imported, and UsageError if it is ours and another package
     hides it.
@@ -158,20 +164,20 @@ def load_point(point: EntryPoint, key: str = "") -> Any:
         if policy.announce is not None or not policy.allowed:
             policy.announce_import(Foreign(key, point.name, point.module, file_of(point.module)))
     try:
-        with wrap_foreign_errors(), _redirect_output(point.module):
+        with wrap_foreign_errors(), _redirect_stdout_to_stderr(point.module):
             return point.load()
     except ForeignFailure as error:
         what = f"cannot be imported from {point.value} ({file_of(point.module)}): {error}"
         raise NotImportable(what) from error.__cause__
 
 
-def load_installed(point: EntryPoint) -> Any:
-    """Return what a package registered that no file names: a section, a report, a command.
+def load_unnamed_entry_point(point: EntryPoint) -> Any:
+    """Import and return an entry point's object no file names, such as a report or command.
 
     UsageError if it cannot be imported.
     """
     try:
-        return load_point(point)
+        return load_entry_point(point)
     except NotImportable as error:
         package = "" if point.dist is None else f" of the package {point.dist.name}"
         message = f"{point.group}: {point.name}{package} {error}"
@@ -185,21 +191,25 @@ def is_ours(point: EntryPoint) -> bool:
 
 @lru_cache(maxsize=64)
 def _distribution_name(distribution: Distribution) -> str:
-    """Return a package's name; studies ask for every block of every replica, and this parses."""
+    """Return a distribution's name in lower case with ``-`` in place of ``_``."""
     return distribution.name.lower().replace("_", "-")
 
 
 def _import_module(module_name: str, beside: Sequence[Path]) -> Any:
     top = module_name.partition(".")[0]
-    folders = search_folders(beside)
-    if others := find_other_module(top, folders):
+    folders = module_search_folders(beside)
+    if others := find_conflicting_module(top, folders):
         raise NotImportable(
             f"module {top!r} was imported from {others[0]} before, which {others[1]} is not: "
             "name that ./FILE.py:CLASS"
         )
     extra = folders_for_module(top, folders)
     try:
-        with append_to_module_path(extra), wrap_foreign_errors(), _redirect_output(module_name):
+        with (
+            append_to_module_path(extra),
+            wrap_foreign_errors(),
+            _redirect_stdout_to_stderr(module_name),
+        ):
             module = importlib.import_module(module_name)
     except ForeignFailure as error:
         raise NotImportable(_explain_failure(module_name, beside, error)) from error.__cause__
@@ -211,7 +221,7 @@ def _import_file(path: Path) -> Any:
     if what := source_file.missing_file_reason(path):
         raise NotImportable(what)
     try:
-        with wrap_foreign_errors(), _redirect_output(path.name):
+        with wrap_foreign_errors(), _redirect_stdout_to_stderr(path.name):
             return source_file.import_file(path)
     except ForeignFailure as error:
         left = "it left with " if isinstance(error.__cause__, SystemExit) else ""
@@ -222,11 +232,11 @@ def _explain_failure(module_name: str, beside: Sequence[Path], error: ForeignFai
     cause, file = error.__cause__, file_of(module_name, beside)
     missing = (cause.name or "") if isinstance(cause, ModuleNotFoundError) else ""
     if missing and (module_name == missing or module_name.startswith(f"{missing}.")):
-        others = [folder for folder in search_folders(beside)[1:] if Path(folder).is_dir()]
+        others = [folder for folder in module_search_folders(beside)[1:] if Path(folder).is_dir()]
         return (
             f"there is no module {module_name!r} in the working directory"
             f"{''.join(f', in {folder}' for folder in others)} or on the Python path"
-            f"{_describe_shadowed(module_name)}"
+            f"{_describe_shadowed_folder(module_name)}"
         )
     if isinstance(cause, SystemExit):
         return (
@@ -238,8 +248,10 @@ def _explain_failure(module_name: str, beside: Sequence[Path], error: ForeignFai
     return f"module {module_name!r} ({file}) cannot be imported: {error}"
 
 
-def _describe_shadowed(module_name: str) -> str:
-    """Say which installed package of the same name was looked in instead of a folder here."""
+def _describe_shadowed_folder(module_name: str) -> str:
+    """Return a hint that an installed package was searched instead of the folder of the same name
+    in the working directory; empty where there is none.
+    """
     top, *rest = module_name.split(".")
     here = Path.cwd() / top
     found = file_of(top)
@@ -256,7 +268,7 @@ def _folder_of_module(module: Any) -> str:
 
 
 class _Shown(io.TextIOBase):
-    """Passes what a module prints while it is imported on to standard error, line by line."""
+    """A text stream that copies a module's prints during import to standard error, by line."""
 
     def __init__(self, module_name: str) -> None:
         self._module_name = module_name
@@ -276,14 +288,14 @@ class _Shown(io.TextIOBase):
         return len(text)
 
     def finish(self) -> None:
-        """Print what is left."""
+        """Print the last line if it was not ended."""
         if self._rest:
             self.write("\n")
 
 
 @contextlib.contextmanager
-def _redirect_output(module_name: str) -> Iterator[None]:
-    """Keep what is printed meanwhile off standard output, which may be JSON."""
+def _redirect_stdout_to_stderr(module_name: str) -> Iterator[None]:
+    """Send prints inside the context to standard error, as standard output may be JSON."""
     shown = _Shown(module_name)
     try:
         with contextlib.redirect_stdout(shown):

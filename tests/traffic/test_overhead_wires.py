@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.traffic.wires import OverheadWire, Post, catenary
+from components.traffic.overhead_wires import OverheadWire, Post, catenary
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
@@ -30,7 +30,7 @@ def test_a_wire_hangs_as_a_catenary_does():
 
 
 def test_pieces_join_from_post_to_post():
-    made = list(wire().pieces())
+    made = list(wire().piece_intruders())
     assert [piece["name"] for piece in made[:2]] == ["w-1", "w-2"] and len(made) == 20
     end = np.array([-100.0, 50.0, 3.0])
     for piece in made:

@@ -16,7 +16,7 @@ NO_AREAS = {"front_m2": 0.0, "side_m2": 0.0, "horizontal_m2": 0.0}
 
 
 class Post(Parameters):
-    """Where a wire is held, as an offset from the ownship's start."""
+    """Top of a post that holds a wire, as an offset from the ownship's start."""
 
     east_m: float = Field(description="Offset to the east, m.")
     north_m: float = Field(description="Offset to the north, m.")
@@ -44,8 +44,10 @@ class OverheadWire(Parameters):
         default=-20.0, description="Radar cross-section of each piece, dBsm (Table 2.3)."
     )
 
-    def pieces(self) -> Iterator[dict[str, Any]]:
-        """Return the pieces as entries of ``intruders``; cameras see none of them."""
+    def piece_intruders(self) -> Iterator[dict[str, Any]]:
+        """Yield each piece of the wire as a dictionary of an intruder's keys: position, radar and
+        laser properties, no camera areas.
+        """
         posts = np.array([[post.east_m, post.north_m, post.up_m] for post in self.posts])
         ends = [catenary(a, b, self.sag_m, self.piece_m) for a, b in pairwise(posts)]
         spans = [(line[:-1], line[1:]) for line in ends]
@@ -78,7 +80,7 @@ class OverheadWire(Parameters):
 
 
 def catenary(first: FloatArray, last: FloatArray, sag_m: float, step_m: float) -> FloatArray:
-    """Return points (n, 3) of a wire that hangs between two posts, these too: east, north, up.
+    """Return points (n, 3) east, north, up (m), in order, of a wire hanging between two posts.
 
     `sag_m` is its depth below the middle of the line between them, `step_m` the longest level
     distance from point to point, all in m. It is a cosh(x / a), a by the sag, hung from the line:

@@ -33,8 +33,8 @@ from dsa_des.studies.allocation import (
     UNTOLD,
     Allocation,
     ForeseenRuns,
-    draw_runs,
     learn_allocation,
+    sample_runs_to_fly,
 )
 from dsa_des.studies.draws import uniform_of_replica
 from dsa_des.studies.metric import Group, Metric, expected_column, measure_one_by_one
@@ -44,15 +44,15 @@ from dsa_des.studies.study import AUTO, Study
 _AT_ONCE = 4096
 
 
-def geometry_of(metrics: Sequence[Metric]) -> list[str]:
-    """Return the names of the geometric quantities known of runs before they are flown."""
+def geometry_names(metrics: Sequence[Metric]) -> list[str]:
+    """Return the names of quantities known before flight, with those of predicted events."""
     names = dict.fromkeys(name for metric in metrics for name in metric.geometry)
     ratios = [one.ratio for metric in metrics for one in metric.results() if one.ratio is not None]
     return [*names, *dict.fromkeys(predicted_column(of.above) for of in ratios if names)]
 
 
 def allocation_refusal(study: Study, scene: Scene) -> str:
-    """Return why a sample of the runs cannot answer a study; nothing if it can."""
+    """Return why a study cannot be answered from a sample of its runs; empty if it can."""
     metrics = {spec.name: spec.build(scene) for spec in study.metrics}
     blind = [name for name, one in metrics.items() if type(one).foresee is Metric.foresee]
     if blind:
@@ -60,7 +60,7 @@ def allocation_refusal(study: Study, scene: Scene) -> str:
             f"{', '.join(blind)} can tell nothing of a run that is not flown: only metrics that "
             "foresee a run (risk_ratio, encounter_weight) go with a sample of the runs"
         )
-    if not geometry_of(list(metrics.values())):
+    if not geometry_names(list(metrics.values())):
         return "no metric of the study tells encounters apart by their geometry: add risk_ratio"
     if study.over:
         return f"goes with replicas, and not with a sample along an axis ({', '.join(study.over)})"
@@ -72,8 +72,8 @@ def allocation_refusal(study: Study, scene: Scene) -> str:
     return ""
 
 
-def ratios_of(results: Sequence[Result], allocate: Sequence[str]) -> list[Result]:
-    """Return the ratios that the choice of runs optimises: those named, or all without a class."""
+def ratios_to_optimise(results: Sequence[Result], allocate: Sequence[str]) -> list[Result]:
+    """Return the ratio results sampling optimises: named ones, by default all not of one class."""
     ratios = [result for result in results if result.ratio is not None]
     if AUTO in allocate:
         return [one for one in ratios if one.ratio is not None and one.ratio.only is None]
@@ -83,7 +83,7 @@ def ratios_of(results: Sequence[Result], allocate: Sequence[str]) -> list[Result
 def predict_results(
     scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
 ) -> dict[str, AnyArray]:
-    """Return what is known of runs without flying them: results, and columns of geometry."""
+    """Return result or geometry column → each replica's values as known without flying it."""
     parts: dict[str, list[AnyArray]] = {}
     batches = max(1, math.ceil(len(replicas) / _AT_ONCE))
     for k in range(batches):
@@ -102,7 +102,7 @@ def predict_results(
 def predict_results_and_errors(
     scene: Scene, metrics: Sequence[Metric], replicas: Sequence[Replica]
 ) -> tuple[dict[str, AnyArray], dict[int, str]]:
-    """Return what is known of runs before they are flown, and the error of each that gave none."""
+    """Return column → values known without flying, and replica index → error if there are none."""
     try:
         return predict_results(scene, metrics, replicas), {}
     except BaseException as error:
@@ -113,7 +113,7 @@ def predict_results_and_errors(
     return measure_one_by_one(partial(predict_results_and_errors, scene, metrics), replicas)
 
 
-def choose_runs(
+def sample_flown_runs(
     study: Study,
     cell: int,
     numbers: Sequence[int],
@@ -121,24 +121,27 @@ def choose_runs(
     results: Sequence[Result],
     columns: Mapping[str, AnyArray],
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return the weight of each run, 0 where it is not flown, (runs,); and predictions.
+    """Return how many runs each run stands for, (runs,), 0 if it is not flown, and column →
+    predicted events.
 
     Whether a run is flown depends on its seed and on what is known of it, and on no other run.
     """
     if plan is None or not columns:  # nothing is known of runs that are all in error
         return np.ones(len(numbers)), {}
-    ratios = [one.ratio for one in ratios_of(results, study.allocate) if one.ratio is not None]
+    ratios = [
+        one.ratio for one in ratios_to_optimise(results, study.allocate) if one.ratio is not None
+    ]
     seed = study.member_seed(cell)
     draws = [uniform_of_replica(seed, "study allocation", number) for number in numbers]
-    known = _known_runs(columns, ratios)
+    known = _foreseen_runs(columns, ratios)
     predicted: dict[str, FloatArray] = {}
     for of, chance in zip(ratios, plan.predictions(known), strict=True):
         name = geometry_column(predicted_column(of.above))
         predicted[name] = np.maximum(predicted.get(name, 0.0), chance)
-    return draw_runs(plan.probabilities(known), draws)[1], predicted
+    return sample_runs_to_fly(plan.probabilities(known), draws)[1], predicted
 
 
-def _known_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
+def _foreseen_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> ForeseenRuns:
     chances = [geometry_column(expected_column(of.above)) for of in ratios]
     names = sorted(name for name in columns if name.startswith(geometry_column("")))
     chance = tuple(geometry_column(of("")) for of in (expected_column, predicted_column))
@@ -159,7 +162,7 @@ def _known_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> Forese
 
 
 def _flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
-    """Return flags of an event, 0 outside the class that a ratio is of."""
+    """Return an event's flags as numbers, 0 if missing or for runs outside the class of a ratio."""
     result: FloatArray = np.nan_to_num(flags.astype(np.float64))
     return result if of.only is None else result * (columns[of.only[0]] == of.only[1])
 
@@ -167,12 +170,12 @@ def _flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) ->
 def allocations_of_round(
     study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
 ) -> dict[int, Allocation]:
-    """Return the plan of every cell for the round that begins with a replica, by earlier rounds."""
+    """Return cell → its plan for the round from replica `first`, learnt from before `number`."""
     if not study.allocate:
         return {}
     ratios = [
         one.ratio
-        for one in ratios_of(folder.record.results, study.allocate)
+        for one in ratios_to_optimise(folder.record.results, study.allocate)
         if one.ratio is not None
     ]
     if first == 0:
@@ -180,7 +183,7 @@ def allocations_of_round(
         return {cell: plan for cell, plan in first_plans.items() if plan is not None}
     rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
     read = {geometry_column(name) for name in folder.record.geometry}
-    read |= {name for of in ratios for name in of.reads()}
+    read |= {name for of in ratios for name in of.columns_read()}
     plans = {}
     for (cell,), chosen in rows.each_place():
         if cell not in cells:
@@ -192,13 +195,13 @@ def allocations_of_round(
         happened = [_flags_in_class(columns, of, columns[of.above]) for of in ratios]
         least = LEAST if first >= PILOT else FIRST_LEAST
         plans[int(cell)] = learn_allocation(
-            _known_runs(columns, ratios), np.array(happened), stood, least
+            _foreseen_runs(columns, ratios), np.array(happened), stood, least
         )
     return plans
 
 
 def _first_plan(study: Study, cell: int, ratios: Sequence[RatioOf]) -> Allocation | None:
-    """Return the plan of a cell's first round, by what is expected of its runs; None flies all."""
+    """Return a cell's first sampling plan, from expected chances only; None if all are flown."""
     replicas = [study.replica(n, cell) for n in range(min(PILOT, study.round_ends[0]))]
     try:
         scene = study.scene(cell)
@@ -207,5 +210,5 @@ def _first_plan(study: Study, cell: int, ratios: Sequence[RatioOf]) -> Allocatio
         return None
     none = np.zeros(len(replicas))
     return learn_allocation(
-        _known_runs(columns, ratios), np.zeros((len(ratios), len(none))), none, FIRST_LEAST
+        _foreseen_runs(columns, ratios), np.zeros((len(ratios), len(none))), none, FIRST_LEAST
     )

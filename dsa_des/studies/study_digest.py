@@ -13,7 +13,12 @@ from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
 from dsa_des.block.mark import Mark, marks_of
-from dsa_des.block.source_file import file_of, is_file, path_of, split_name
+from dsa_des.block.source_file import (
+    absolute_file_path,
+    file_of,
+    is_python_file_path,
+    split_type_name,
+)
 from dsa_des.costs.models import scene_record
 from dsa_des.errors import BlockFailure, SceneError, UsageError
 from dsa_des.files.input_files import resolve_home
@@ -25,12 +30,12 @@ from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import short_text
 from dsa_des.results.models import EXPLAINED, Explained, SceneRecord, read_explained, versions
 from dsa_des.results.record import Result, StudyRecord, draw_column
-from dsa_des.scene.keys import name_items
+from dsa_des.scene.keys import readable_key
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import file_digest
-from dsa_des.studies.foreseen import geometry_of
+from dsa_des.studies.foreseen_runs import geometry_names
 from dsa_des.studies.study import Study, format_set_value
 from dsa_des.studies.study_checks import cells_covering_values
 from dsa_des.studies.study_tables import json_safe
@@ -41,8 +46,8 @@ _MOST_CELLS = 12
 _PROSE = ("title", "description", "labels")
 
 
-def description_text(study: Study) -> str:
-    """Return the content of ``study.json``: what fixes every result, and how to read them."""
+def study_json_text(study: Study) -> str:
+    """Return the text of ``study.json``: the record, and a hash of what determines results."""
     identity: dict[str, Any] = {
         "scene": study.base.data,
         "seed": study.seed,
@@ -63,16 +68,16 @@ def description_text(study: Study) -> str:
     if study.splitting is not None:
         identity["splitting"] = vars(study.splitting)
     try:
-        files = files_of(study)
+        files = study_input_files(study)
         identity["files"] = {str(path): file_digest(path) for path in sorted(files)}
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
     text = json.dumps(json_safe(identity), sort_keys=True)
-    return record_text(study, hashlib.sha256(text.encode()).hexdigest())
+    return study_json_text_with_hash(study, hashlib.sha256(text.encode()).hexdigest())
 
 
-def files_of(study: Study) -> set[Path]:
-    """Return the files that a study's values name: their content fixes results too."""
+def study_input_files(study: Study) -> set[Path]:
+    """Return the files that a study's values name, whose content determines its results too."""
     given: list[Any] = [study.sets, study.swaps, [(axis.sets, axis.swaps) for axis in study.axes]]
     given += [[draw.values for draw in study.draws], [vars(spec) for spec in study.metrics]]
     beside = study.path.parent, study.scene_path.parent
@@ -80,12 +85,12 @@ def files_of(study: Study) -> set[Path]:
 
 
 def record_of(study: Study) -> StudyRecord:
-    """Return the record of a study as its folder will hold it."""
-    return StudyRecord.model_validate_json(description_text(study))
+    """Return the `StudyRecord` that the study's folder will hold."""
+    return StudyRecord.model_validate_json(study_json_text(study))
 
 
 def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
-    """Return the files that values name: encounters, terrain, tables, modules.
+    """Return the files that the texts in a value name: encounters, terrain, tables, modules.
 
     Their content fixes results as much as the values do. A relative name counts from the folder of
     the file that holds it; whichever way a file is named, its content is what counts.
@@ -97,14 +102,14 @@ def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
     if not isinstance(value, str):
         return set()
     try:
-        files = _module_of(value, beside) or _named_files(value)
+        files = _module_file(value, beside) or _named_files(value)
         return set() if files is None else files | _files_extended_by(files)
     except (OSError, ValueError):  # a text that can be no path
         return set()
 
 
 def _named_files(text: str) -> set[Path] | None:
-    """Return the file of this name, or those of a run's folder."""
+    """Return the file that a text names, or all files of a named run folder; None for neither."""
     folder, path = getattr(text, "folder", None), resolve_home(text)
     if folder is None and not path.is_absolute():
         return None
@@ -116,13 +121,13 @@ def _named_files(text: str) -> set[Path] | None:
     return None
 
 
-def _module_of(text: str, beside: Sequence[Path]) -> set[Path] | None:
-    """Return the file of a class that is named by its module or file."""
-    module, class_name = split_name(text)
+def _module_file(text: str, beside: Sequence[Path]) -> set[Path] | None:
+    """Return as a set the source file of a class named by module or file; None if none is named."""
+    module, class_name = split_type_name(text)
     if not class_name.isidentifier():
         return None
-    if is_file(module):
-        return {path_of(text)} if path_of(text).is_file() else None
+    if is_python_file_path(module):
+        return {absolute_file_path(text)} if absolute_file_path(text).is_file() else None
     if not all(part.isidentifier() for part in module.split(".")):
         return None
     own = [Path(text.folder)] if hasattr(text, "folder") else []
@@ -131,7 +136,7 @@ def _module_of(text: str, beside: Sequence[Path]) -> set[Path] | None:
 
 
 def _files_extended_by(files: set[Path]) -> set[Path]:
-    """Return what TOML files among some extend and name themselves."""
+    """Return the files that the TOML files among `files` extend or name."""
     extended: set[Path] = set()
     for path in files:
         if path.suffix == ".toml":
@@ -143,13 +148,13 @@ def _files_extended_by(files: set[Path]) -> set[Path]:
 
 
 def geometry_of_study(study: Study) -> list[str]:
-    """Return the numbers by which runs of a study are chosen; none where all are flown."""
+    """Return the names of the quantities by which a study samples runs; none if all are flown."""
     scene = study.scene(0)
-    return geometry_of([spec.build(scene) for spec in study.metrics]) if study.allocate else []
+    return geometry_names([spec.build(scene) for spec in study.metrics]) if study.allocate else []
 
 
 def results_of(study: Study) -> list[Result]:
-    """Return the results that a study's metrics give."""
+    """Return the result columns that a study's metrics produce, with the marks of their blocks."""
     scene = study.scene(0)
     results = [result for spec in study.metrics for result in spec.build(scene).results()]
     marks = marks_of({name: block.cls for name, block in scene.blocks.items()})
@@ -157,7 +162,7 @@ def results_of(study: Study) -> list[Result]:
 
 
 def _add_mark(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
-    """Return a result with the mark of its block, if that block's class has one."""
+    """Return a result with the colour and marker of its block, if that block's class has them."""
     name = result.block or result.name.partition(".")[2]
     if name not in scene.blocks or getattr(scene.blocks[name].cls, "mark", None) is None:
         return result
@@ -165,7 +170,7 @@ def _add_mark(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result
 
 
 def is_category(axis: Axis, scene: Scene) -> bool:
-    """Return whether an axis sets what is one of a few names: a type, a flag, a model's number."""
+    """Return whether an axis has names as values: types, flags or a parameter's named choices."""
     for key, _ in axis.sets[0] if axis.sets else ():
         parts = key.split(".")
         if len(parts) != 3 or parts[0] != "blocks" or parts[1] not in scene.blocks:
@@ -183,7 +188,7 @@ def _is_choice_of_names(annotation: Any) -> bool:
     return bool(parts) and all(_is_choice_of_names(part) for part in parts)
 
 
-def record_text(study: Study, digest: str) -> str:
+def study_json_text_with_hash(study: Study, digest: str) -> str:
     """Return the content of ``study.json``, given the SHA-256 of all that fixes its results."""
     content = {
         "study": str(study.path.resolve()),
@@ -196,7 +201,7 @@ def record_text(study: Study, digest: str) -> str:
         "axes": [
             {
                 "column": axis.column,
-                "words": name_items(study.base.data, axis.key).removeprefix("blocks."),
+                "words": readable_key(study.base.data, axis.key).removeprefix("blocks."),
                 "values": axis.labels,
                 "over": axis.column in study.over,
                 "numeric": axis.numeric,
@@ -240,7 +245,7 @@ def record_text(study: Study, digest: str) -> str:
 
 
 def explain_study(study: Study) -> Explained:
-    """Return of what a study's runs are made."""
+    """Return the record of package versions, scene and models behind a study's runs."""
     scenes: list[SceneRecord] = []
     text = ""
     for cell in cells_covering_values(study)[:_MOST_CELLS]:
@@ -252,13 +257,13 @@ def explain_study(study: Study) -> Explained:
             text = text or to_toml(scene.resolved())
         except (SceneError, BlockFailure, ValueError):
             continue  # its rows say why
-        scenes.append(_subtract_record(record, scenes[0]) if scenes else record)
+        scenes.append(_entries_not_in_first(record, scenes[0]) if scenes else record)
     scenes = [one for one in scenes if one.models or one.effects or one.spared]
     return Explained(versions=versions(), scene=text, scenes=scenes)
 
 
-def _subtract_record(result: SceneRecord, first: SceneRecord) -> SceneRecord:
-    """Return what is not so in the first scene."""
+def _entries_not_in_first(result: SceneRecord, first: SceneRecord) -> SceneRecord:
+    """Return a scene's record with only the models, effects and spared work the first lacks."""
     lists = ("models", "effects", "spared")
     new = {n: [one for one in getattr(result, n) if one not in getattr(first, n)] for n in lists}
     return result.model_copy(update=new)
