@@ -20,7 +20,7 @@ from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output
 from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 
 _KINDS = {"turn": "hdir", "climb": "alt", "speed": "hs", "vertical_speed": "vs"}
 # Where the configuration has manoeuvres take no time, they are flown so fast: 3 deg/s, 500 ft/min,
@@ -63,7 +63,9 @@ class TurnOutParameters(ConfParameters):
     )
 
     def ineffective_key_notes(self) -> list[str]:
-        """Return a sentence for each key of a manoeuvre that is not chosen."""
+        """Return a sentence for each key that is set but has no effect: of a manoeuvre not chosen,
+        or heeds_s without an address.
+        """
         used = {"turn": "beyond_deg", "climb": "beyond_m"}.get(self.manoeuvre, "beyond_mps")
         keys = {"beyond_deg", "beyond_m", "beyond_mps"} - {used}
         because = f"manoeuvre is '{self.manoeuvre}'"
@@ -144,7 +146,9 @@ class TurnOut(Component):
         return self.p.address if port == "told" else None
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return, by message, how often per run a manoeuvre was needed and none led clear."""
+        """Return, under its message, how often in each run a manoeuvre was needed but none led
+        clear.
+        """
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
@@ -184,7 +188,7 @@ class TurnOut(Component):
                 change = None if changes is None else self._choose_change(run, tick, changes)
                 if changes is not None and self._is_free_to_manoeuvre(run, tick):
                     due = np.array([run])
-                    self._stuck = add_cases(self._stuck, due[: change is None], due)
+                    self._stuck = counts_with_cases_added(self._stuck, due[: change is None], due)
                 if change is not None:
                     manoeuvres[index] = self._manoeuvre_of_change(change)
                     self._free_from[run] = tick + self._pause_ticks
@@ -244,7 +248,9 @@ class TurnOut(Component):
         return side if self.p.manoeuvre == "turn" else -side
 
     def _renewed_own_side(self, run: int, tick: int) -> int:
-        """Return and renew the side already chosen in the present conflict; 0 if none."""
+        """Return the side chosen in the present conflict and note that it holds on from now; 0 if
+        none.
+        """
         at, side = self._chosen.get(run, (-1, 0))
         if not side or tick - at > int(self.p.heeds_s * self.context.ticks_per_s):
             return 0
@@ -256,7 +262,9 @@ class TurnOut(Component):
         return tick >= self._free_from.get(run, 0)
 
     def _must_give_way(self, run: int, tick: int) -> bool:
-        """Return whether an aircraft of lower address has chosen a manoeuvre that conflicts."""
+        """Return whether an aircraft of lower address has chosen a side incompatible with one's
+        own.
+        """
         mine = self._renewed_own_side(run, tick) if self.p.address is not None else 0
         first = [
             side for a, side in self._find_valid_choices(run, tick) if a < (self.p.address or 0)

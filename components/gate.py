@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.messages.reach import Decision, FarthestLook, Reach, farthest_look
+from components.messages.reach import Decision, FarthestLook, Reach, combined_farthest_look
 from components.messages.targets import GatedTargets, RelativeTargets
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
@@ -34,7 +34,7 @@ class Gate(Component):
 
     def request(self, port: str) -> FarthestLook:
         """Return the union of all connected sensors' requests: farthest range, widest angles."""
-        return farthest_look(consumer.request for consumer in self.context.consumers)
+        return combined_farthest_look(consumer.request for consumer in self.context.consumers)
 
     def offer(self, port: str) -> Any:
         """Return the offer of the block upstream unchanged, or None without one."""

@@ -7,14 +7,14 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field
 
-from components.messages.detections import names_of_rangeless_sensors
+from components.messages.detections import joined_names_if_all_rangeless
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.tracks import Tracks
 from dsa_des.arrays.run_ticks import take_runs
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 
 
 class TurnAwayParameters(Parameters):
@@ -94,7 +94,9 @@ class TurnAway(Component):
 
     def warnings(self) -> list[str]:
         """Return a warning if no sensor measures the range that the block needs to act."""
-        blind = "" if self.p.without_range else names_of_rangeless_sensors(self.context.producers)
+        blind = (
+            "" if self.p.without_range else joined_names_if_all_rangeless(self.context.producers)
+        )
         if not blind:
             return []
         return [f"without_range is false and {blind} measures no range: it never turns"]
@@ -116,7 +118,9 @@ class TurnAway(Component):
         row = tracks.row_of_entries
         rangeless = np.isnan(tracks.range_m)
         of = take_runs(tracks.run, row)
-        self._rangeless = add_cases(self._rangeless, take_runs(of, rangeless.nonzero()[0]), of)
+        self._rangeless = counts_with_cases_added(
+            self._rangeless, take_runs(of, rangeless.nonzero()[0]), of
+        )
         if self.p.without_range:
             near |= rangeless
         manoeuvres: dict[int, Manoeuvre] = {}

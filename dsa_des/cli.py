@@ -95,9 +95,9 @@ def graph(**options: Any) -> None:
 @plain_errors
 def explain(**options: Any) -> None:
     """Say which effects SCENE calls for, which it does not, and because of what."""
-    from dsa_des.commands.scene import explain_scene
+    from dsa_des.commands.scene import print_effects_of_scene
 
-    explain_scene(**options)
+    print_effects_of_scene(**options)
 
 
 _resume_option = click.option(
@@ -166,13 +166,13 @@ def cost(answers: tuple[str, ...], listed: tuple[str, ...], **options: Any) -> N
     With --answer SCENE is a STUDY, and it is said by how much each model changes its results.
     """
     if answers:
-        from dsa_des.commands.cost_answer import cost_at_the_answer
+        from dsa_des.commands.cost_answer import run_study_with_each_model
 
-        cost_at_the_answer(answers=answers, listed=listed, **options)
+        run_study_with_each_model(answers=answers, listed=listed, **options)
         return
-    from dsa_des.commands.cost import cost_of_accuracy
+    from dsa_des.commands.cost import measure_cost_of_accuracy
 
-    cost_of_accuracy(listed=listed, **options)
+    measure_cost_of_accuracy(listed=listed, **options)
 
 
 @main.command()
@@ -191,9 +191,9 @@ def components(name: str | None, key: str | None) -> None:
 @plain_errors
 def examples(copy: str | None) -> None:
     """List the shipped scenes and studies: their names stand for their files everywhere."""
-    from dsa_des.commands.catalogue import show_examples
+    from dsa_des.commands.catalogue import list_or_copy_examples
 
-    show_examples(copy)
+    list_or_copy_examples(copy)
 
 
 _out_option = click.option(

@@ -273,7 +273,7 @@ class Roster:
         return np.asarray(self.equipage.ads_b.reshape(1 + len(self.later), -1).any(axis=0))
 
     @cached_property
-    def engines(self) -> AnyArray:
+    def propulsion_types(self) -> AnyArray:
         """Propulsion type of each target, shape (targets,) of text."""
         return np.array([craft.engine for craft in self.aircraft], dtype=np.str_)
 

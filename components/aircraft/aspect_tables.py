@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import FloatArray, broadcast_flat, finite, refuse, unflatten
+from components.arguments.checks import FloatArray, broadcast_flat, check_finite, refuse, unflatten
 from components.arguments.units import FOOT_M
 from components.geometry import remainder
 from dsa_des.block.parameters import refuse_extremes
@@ -42,7 +42,7 @@ _WIDEST_STEP_TO_NEIGHBOUR = 1.5
 
 def dbsm_to_m2(rcs_dbsm: ArrayLike) -> Any:
     """Return the RCS in m² of one in dBsm (dB above 1 m²)."""
-    shape, (flat,) = broadcast_flat(rcs=finite("rcs_dbsm", rcs_dbsm))
+    shape, (flat,) = broadcast_flat(rcs=check_finite("rcs_dbsm", rcs_dbsm))
     refuse("rcs_dbsm", flat, np.abs(flat) > 1000.0, "lie in [-1000, 1000]")
     return unflatten(np.power(10.0, flat / 10.0), shape)
 
@@ -121,14 +121,14 @@ class SilhouetteTable:
         return _interpolate(*nodes, self.area_m2, azimuth_rad, elevation_rad)
 
 
-def table_from_nodes(
+def silhouette_table_from_nodes(
     azimuth_deg: ArrayLike, elevation_deg: ArrayLike, area_m2: ArrayLike
 ) -> SilhouetteTable:
     """Build a table of areas from one row per node, in any order.
 
     The rows of the poles, where all azimuths are one direction, are averaged.
     """
-    elevation, area = finite("elevation_deg", elevation_deg), finite("area_m2", area_m2)
+    elevation, area = check_finite("elevation_deg", elevation_deg), check_finite("area_m2", area_m2)
     refuse("el_deg", elevation, ~(np.abs(elevation) <= 90.0), "be between -90 and 90")
     refuse("area_m2", area, ~(area >= 0.0), "be 0 or more")
     azimuths, elevations, rows = _grid_from_nodes(azimuth_deg, elevation, area, "area_m2")
@@ -140,12 +140,12 @@ def table_from_nodes(
     return SilhouetteTable(azimuths, elevations, rows)
 
 
-def read_aspect_table(path: str | PathLike[str]) -> SilhouetteTable:
+def read_silhouette_table(path: str | PathLike[str]) -> SilhouetteTable:
     """Read a table from CSV with the columns az_deg, el_deg and one of `AREA_COLUMNS`."""
     what = f"an area (one of {', '.join(AREA_COLUMNS)})"
     nodes = _read_nodes(path, AREA_COLUMNS, "area_m2", what)
     try:
-        return table_from_nodes(*nodes)
+        return silhouette_table_from_nodes(*nodes)
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
 
@@ -159,8 +159,8 @@ def _interpolate(
 ) -> Any:
     """Return the values of a table at directions, bilinear between its nodes."""
     shape, (azimuth, elevation) = broadcast_flat(
-        azimuth_rad=finite("azimuth_rad", azimuth_rad),
-        elevation_rad=finite("elevation_rad", elevation_rad),
+        azimuth_rad=check_finite("azimuth_rad", azimuth_rad),
+        elevation_rad=check_finite("elevation_rad", elevation_rad),
     )
     degrees = elevation * (180.0 / np.pi)
     refuse("elevation_rad", elevation, np.abs(degrees) > _POLE_DEG, "lie in [-pi/2, pi/2]")
@@ -187,7 +187,7 @@ def _convert_and_check_grid(table: Any, values: str) -> None:
     rise and the shape is (elevations, azimuths).
     """
     for field in ("azimuth_deg", "elevation_deg", values):
-        object.__setattr__(table, field, np.array(finite(field, getattr(table, field))))
+        object.__setattr__(table, field, np.array(check_finite(field, getattr(table, field))))
     azimuth, elevation = table.azimuth_deg, table.elevation_deg
     for name, nodes in (("azimuth_deg", azimuth), ("elevation_deg", elevation)):
         if nodes.ndim != 1 or nodes.size == 0 or np.any(np.diff(nodes) <= 0.0):
@@ -209,7 +209,7 @@ def _grid_from_nodes(
     in any order; raise ValueError for a hole.
     """
     columns = [
-        finite(column, given).reshape(-1)
+        check_finite(column, given).reshape(-1)
         for column, given in (("az_deg", az_deg), ("el_deg", el_deg), (name, values))
     ]
     if len({column.size for column in columns}) != 1 or columns[0].size == 0:

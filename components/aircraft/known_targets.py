@@ -43,8 +43,8 @@ class KnownTraffic:
         return self._asked or any(view.is_envelope_used for view in self._views.values())
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
-        """Return bounds on where targets can be, for a reach in m and looks that last `lasts_s`;
-        None where they are not known in advance.
+        """Return bounds on where targets can be, for a sensor's range in m and the seconds one look
+        of it lasts; None if unknown.
         """
         if self._envelope is None:  # of no replica
             return None

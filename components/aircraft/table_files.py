@@ -35,9 +35,9 @@ def _read_rcs_table(path: Path) -> Any:
 
 
 def _read_silhouette_table(path: Path) -> Any:
-    from components.aircraft.aspect_tables import read_aspect_table
+    from components.aircraft.aspect_tables import read_silhouette_table
 
-    return read_aspect_table(path)
+    return read_silhouette_table(path)
 
 
 @cache_file_reads(64)

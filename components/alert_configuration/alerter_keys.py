@@ -15,7 +15,7 @@ from components.alert_configuration.conf_keys import (
     TCAS_KEYS,
     VOLUME_KEYS,
     BadValue,
-    parse_value,
+    parse_value_and_unit,
 )
 from components.alert_configuration.configuration import Alerter, Level
 from components.alert_configuration.tcas_tables import TableKeys
@@ -197,7 +197,7 @@ class AlerterKeys:
         for key in [key for key in self._lines if key.startswith(start)]:
             number, shown, text = self._lines[key]
             try:
-                if table.read_key(key[len(start) :], shown, text):
+                if table.store_if_tcas_key(key[len(start) :], shown, text):
                     self._used.add(key)
             except BadValue as error:
                 self._used.add(key)
@@ -205,7 +205,7 @@ class AlerterKeys:
                 bad = True
         if bad:
             return None
-        differs = {resolution: table.differences(resolution) for resolution in (False, True)}
+        differs = {resolution: table.differing_keys(resolution) for resolution in (False, True)}
         resolution = len(differs[True]) < len(differs[False]) if given is None else bool(given)
         if differs[resolution]:
             which = "resolution" if resolution else "traffic"
@@ -229,7 +229,7 @@ class AlerterKeys:
         number, name, text = self._lines[key]
         self._used.add(key)
         try:
-            return parse_value(kind, text)[0]
+            return parse_value_and_unit(kind, text)[0]
         except BadValue as error:
             self._problems.add(f"{name} {error}", line=number)
             return None

@@ -12,7 +12,7 @@ from components.alert_configuration.conf_keys import (
     SIGNED,
     UNITS,
     BadValue,
-    parse_value,
+    parse_value_and_unit,
 )
 from components.alert_configuration.configuration import Configuration
 from components.formats.text_rows import MOST_OF_A_CELL, Problems, read_lines
@@ -49,7 +49,7 @@ def read_conf(path: str | PathLike[str]) -> Configuration:
     problems = Problems(str(path), most=_MOST_PROBLEMS)
     lines = _read_lines_by_key(path, problems)
     _refuse_daidalus_1(lines, path)
-    values, units = _read_common_values(lines, problems)
+    values, units = _read_common_values_and_units(lines, problems)
     keys = AlerterKeys(lines, problems)
     alerters = keys.read_alerters()
     _check_contradictions(values, lines, problems)
@@ -70,7 +70,7 @@ def _refuse_daidalus_1(lines: Lines, path: Path) -> None:
         )
 
 
-def default_values() -> tuple[dict[str, Any], dict[str, str]]:
+def default_values_and_units() -> tuple[dict[str, Any], dict[str, str]]:
     """Return the value of every key that belongs to no alerter, and its unit, by default."""
     values = {
         key: default * UNITS[kind][unit] if isinstance(default, float) and unit else default
@@ -96,15 +96,17 @@ def _read_lines_by_key(path: Path, problems: Problems) -> Lines:
     return result
 
 
-def _read_common_values(lines: Lines, problems: Problems) -> tuple[dict[str, Any], dict[str, str]]:
+def _read_common_values_and_units(
+    lines: Lines, problems: Problems
+) -> tuple[dict[str, Any], dict[str, str]]:
     """Return values and units, by key, of keys that belong to no alerter; defaults if missing."""
-    values, units = default_values()
+    values, units = default_values_and_units()
     for key, (kind, default, _) in KEYS.items():
         if key not in lines:
             continue
         number, name, text = lines[key]
         try:
-            value, unit = parse_value(kind, text, negative=key in SIGNED)
+            value, unit = parse_value_and_unit(kind, text, negative=key in SIGNED)
         except BadValue as error:
             problems.add(f"{name} {error}", line=number)
             continue
@@ -133,23 +135,25 @@ def _read_common_values(lines: Lines, problems: Problems) -> tuple[dict[str, Any
 def _check_contradictions(values: dict[str, Any], lines: Lines, problems: Problems) -> None:
     """Add a problem for each pair of values that contradict each other."""
 
-    def line_of(key: str) -> int | None:
+    def line_number_of(key: str) -> int | None:
         return lines[key][0] if key in lines else None
 
     for low, high in (("min_hs", "max_hs"), ("min_vs", "max_vs"), ("min_alt", "max_alt")):
         if values[low] >= values[high]:
-            problems.add(f"{low} must lie below {high}", line=line_of(low) or line_of(high))
+            problems.add(
+                f"{low} must lie below {high}", line=line_number_of(low) or line_number_of(high)
+            )
     for key in ("step_hdir", "step_hs", "step_vs", "step_alt", "lookahead_time"):
         if values[key] == 0.0:
-            problems.add(f"{key} is 0: it must be above 0", line=line_of(key))
+            problems.add(f"{key} is 0: it must be above 0", line=line_number_of(key))
     if values["alerting_m"] > values["alerting_n"]:
         problems.add(
             f"alerting_m is {values['alerting_m']}: it must be at most alerting_n, "
             f"{values['alerting_n']}",
-            line=line_of("alerting_m"),
+            line=line_number_of("alerting_m"),
         )
     if not 0.0 < values["ca_factor"] < 1.0:
         problems.add(
             f"ca_factor is {values['ca_factor']:g}: it must lie between 0 and 1",
-            line=line_of("ca_factor"),
+            line=line_number_of("ca_factor"),
         )

@@ -146,7 +146,7 @@ class BadValue(ValueError):
     """A value that cannot be used; the message says why and what is allowed."""
 
 
-def parse_value(kind: str, text: str, *, negative: bool = False) -> tuple[Any, str]:
+def parse_value_and_unit(kind: str, text: str, *, negative: bool = False) -> tuple[Any, str]:
     """Return a text's value, in SI units or as its kind demands, and its unit, empty for none."""
     match = _VALUE.fullmatch(text.strip())
     if match is None:

@@ -79,7 +79,7 @@ class Configuration:
         """Largest number of levels that an alerter of the configuration has."""
         return max(len(alerter.levels) for alerter in self.alerters)
 
-    def corrective_level(self, alerter: Alerter) -> Level | None:
+    def first_corrective_level(self, alerter: Alerter) -> Level | None:
         """Return an alerter's first level whose region is at least corrective; None without one."""
         least = REGIONS.index(self["corrective_region"])
         for level in alerter.levels:

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
-from components.alert_configuration.conf_keys import parse_value
+from components.alert_configuration.conf_keys import parse_value_and_unit
 from components.well_clear.tcas import (
     FIRST_LEVEL,
     LEVEL_TOPS_M,
@@ -38,23 +38,23 @@ class TableKeys:
         self._tops: dict[int, tuple[str, float]] = {}
         self._sizes: list[tuple[str, str, int, float]] = []
 
-    def read_key(self, key: str, shown: str, text: str) -> bool:
+    def store_if_tcas_key(self, key: str, shown: str, text: str) -> bool:
         """Store the value of a TCAS table's key and return True; return False for any other key."""
         match = _KEY.fullmatch(key)
         if match is None:
             return False
         quantity, level = match.group(2), int(match.group(3) or 0)
         if quantity is None:
-            self._filter = shown, parse_value("yes or no", text)[0]
+            self._filter = shown, parse_value_and_unit("yes or no", text)[0]
             return True
-        value = float(parse_value(_KINDS.get(quantity, "length"), text)[0])
+        value = float(parse_value_and_unit(_KINDS.get(quantity, "length"), text)[0])
         if quantity == "level":
             self._tops[level] = shown, value
         else:
             self._sizes.append((shown, quantity, level, value))
         return True
 
-    def differences(self, resolution: bool) -> list[str]:
+    def differing_keys(self, resolution: bool) -> list[str]:
         """Return the keys whose values differ from the known TCAS II table, RA or TA."""
         result = [
             shown

@@ -169,7 +169,7 @@ def _draw_corrective_volume(axes: Any, configuration: Configuration, encounter: 
         int(np.argmin(np.where(encounter.present, range_m, np.inf))), range_m.shape
     )
     alerter = configuration.alerters[int(encounter.alerter[row, column])]
-    level = configuration.corrective_level(alerter)
+    level = configuration.first_corrective_level(alerter)
     if level is None or not isinstance(level.volume, Volume):
         return
     turn = np.linspace(0.0, 2.0 * np.pi, 181)

@@ -10,7 +10,7 @@ import numpy as np
 from components.alert_configuration.conf_file import read_conf
 from components.alert_configuration.configuration import Configuration
 from components.alerting.alert_figure import draw_alerts
-from components.alerting.alert_tables import alert_table, bands_table, remove_hysteresis
+from components.alerting.alert_tables import alert_table_csv, bands_table_csv, remove_hysteresis
 from components.alerting.encounter import Encounter, read_encounter
 from components.alerting.levels import Alerts, alert_levels
 from components.formats.recorded.traffic_of_files import TrafficChoice
@@ -176,7 +176,7 @@ def _write_output(
     if option == "--figure":
         draw_alerts(path, one.path.stem, configuration, one.encounter, one.alerts)
         return
-    table = bands_table if option == "--bands" else alert_table
+    table = bands_table_csv if option == "--bands" else alert_table_csv
     write_file(path, table(configuration, one.encounter, one.alerts, decimals).encode())
 
 

@@ -16,7 +16,7 @@ from components.guidance.memory import GuidanceMemory
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
 from components.well_clear.detection import select_bounds
-from components.well_clear.separation import separation
+from components.well_clear.separation import present_and_projected_separation
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -45,11 +45,11 @@ def remove_hysteresis(configuration: Configuration) -> Configuration:
     return replace(configuration, values=values)
 
 
-def alert_table(
+def alert_table_csv(
     configuration: Configuration, encounter: Encounter, alerts: Alerts, decimals: int = DECIMALS
 ) -> str:
     """Return the table of an encounter as comma-separated text with two rows of headings."""
-    units = _table_units(configuration)
+    units = _unit_and_factor_by_kind(configuration)
     shown = _separation_columns(configuration)
     names = ["Time", "Ownship", "Traffic", "Alerter", "Alert Level"]
     heading_units = ["[s]", "", "", "", ""]
@@ -61,11 +61,11 @@ def alert_table(
         heading_units.append(f" [{units[kind][0]}]")
     lines = [" " + ", ".join(names), ",".join(heading_units)]
     row, column = np.nonzero(encounter.present)
-    lines += _table_rows(configuration, encounter, alerts, row, column, decimals)
+    lines += _csv_rows(configuration, encounter, alerts, row, column, decimals)
     return "\n".join(lines) + "\n"
 
 
-def _table_units(configuration: Configuration) -> dict[str, tuple[str, float]]:
+def _unit_and_factor_by_kind(configuration: Configuration) -> dict[str, tuple[str, float]]:
     """Return the unit's name and its factor to SI for each kind of quantity in a table, as the
     configuration gives its recovery sizes and steps.
     """
@@ -85,12 +85,12 @@ def _separation_columns(configuration: Configuration) -> tuple[tuple[str, str, s
     """Return name, key and kind of the columns on separation; modified tau is left out where the
     first alerter uses a TCAS advisory.
     """
-    first = configuration.corrective_level(configuration.alerters[0])
+    first = configuration.first_corrective_level(configuration.alerters[0])
     advisory = first is not None and isinstance(first.volume, TcasAdvisory)
     return _SEPARATION[:-1] if advisory else _SEPARATION
 
 
-def _table_rows(
+def _csv_rows(
     configuration: Configuration,
     encounter: Encounter,
     alerts: Alerts,
@@ -99,10 +99,10 @@ def _table_rows(
     decimals: int,
 ) -> list[str]:
     cells = row, column
-    first = configuration.corrective_level(configuration.alerters[0])
+    first = configuration.first_corrective_level(configuration.alerters[0])
     volume = None if first is None else first.volume
     distance_m = volume.horizontal_m if isinstance(volume, Volume) else np.nan
-    result = separation(
+    result = present_and_projected_separation(
         tuple(part[cells] for part in encounter.relative),
         configuration["lookahead_time"],
         np.full(len(row), distance_m),
@@ -116,7 +116,7 @@ def _table_rows(
     ]
     for number in range(configuration.most_levels):
         texts.append(number_texts(alerts.violation_s[cells][:, number], decimals))
-    units = _table_units(configuration)
+    units = _unit_and_factor_by_kind(configuration)
     for _, key, kind in _separation_columns(configuration):
         texts.append(number_texts(result[key] / units[kind][1], decimals))
     return [", ".join(parts) for parts in zip(*texts, strict=True)]
@@ -183,7 +183,7 @@ def bands_over_time(
     return BandsOverTime(encounter.time_s, np.array([one.own_value for one in result]), bands)
 
 
-def bands_table(
+def bands_table_csv(
     configuration: Configuration, encounter: Encounter, alerts: Alerts, decimals: int
 ) -> str:
     """Return the bands of all four kinds as comma-separated text, a row per band.

@@ -14,14 +14,16 @@ from components.messages.tracks import Tracks
 from dsa_des.arrays.run_ticks import RunTicks, first_position_in_runs, last_position_at_or_before
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.failure_counts import NO_RUNS, add_cases
+from dsa_des.record.failure_counts import NO_RUNS, counts_with_cases_added
 
 # Positions closer in time than this are one instant, from which no velocity follows, s.
 _SHORTEST_S = 1e-6
 
 
 class BelievedFlights(NamedTuple):
-    """Relative flights believed: a row per scan and a column per target, or a row per track."""
+    """Relative flights (ownship less target) that alerts are computed from: a row per scan and a
+    column per target, or a row per track.
+    """
 
     known: BoolArray  # (rows, columns)
     # Six of (rows, columns): east, north, up in m and their rates in m/s, ownship less target.
@@ -51,8 +53,10 @@ class BelievedPositions:
         self._rangeless, self._unmoving = np.zeros((2, 2, 0), dtype=np.int64)
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often targets could not be judged, as reason to (2, runs) counts."""
-        return not_judged_counts(self._rangeless, self._unmoving)
+        """Return cause → (2, runs) counts: how often targets could not be judged for it, and of how
+        many cases.
+        """
+        return unjudged_counts_by_cause(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
         """Store true target positions (n, targets, 3) at run times, and when each message came."""
@@ -68,11 +72,11 @@ class BelievedPositions:
             new &= sights.updated  # others came with an earlier row
         with_range = np.isfinite(sights.range_m)
         run = arrived.instants.run[row]
-        self._rangeless = add_cases(self._rangeless, run[new & ~with_range], run[new])
+        self._rangeless = counts_with_cases_added(self._rangeless, run[new & ~with_range], run[new])
         new &= with_range
         # The attitude of when it was measured, of those that have arrived.
         came = arrived.instants.take(row)
-        pose = own.pose_index(RunTicks(came.run, sights.measured_tick), came, new)
+        pose = own.pose_index_at_measurement(RunTicks(came.run, sights.measured_tick), came, new)
         new &= pose >= 0
         row = row[new]
         yaw, pitch, roll = own.attitude_rad(pose[new])
@@ -138,7 +142,9 @@ class BelievedPositions:
             )
         if not known.all() and len(time_s):
             self._fit_last_two_positions(now, now_s, known, state)
-        self._unmoving = add_cases(self._unmoving, NO_RUNS, now.run[known.nonzero()[0]])
+        self._unmoving = counts_with_cases_added(
+            self._unmoving, NO_RUNS, now.run[known.nonzero()[0]]
+        )
         return known, state
 
     def _fit_last_two_positions(
@@ -159,7 +165,7 @@ class BelievedPositions:
         state[:, scans[of], target] = found[1][:, :, 0]
         there = (last >= 0) & (now_s[scans, np.newaxis] - time_s[last] <= self._keep_s)
         lacking = now.run[scans[(there & ~known[scans]).nonzero()[0]]]
-        self._unmoving = add_cases(self._unmoving, lacking, lacking)
+        self._unmoving = counts_with_cases_added(self._unmoving, lacking, lacking)
 
     def _last_two_rows(self, now: RunTicks) -> tuple[IntArray, IntArray]:
         """Return the last and the last but one stored row with a position of each target, at
@@ -191,8 +197,10 @@ class BelievedPositions:
             before = np.where(alike, last_row_with_position(before - 1), before)
 
 
-def not_judged_counts(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
-    """Return by run, per sentence on a cause, counts of targets without a range or a velocity."""
+def unjudged_counts_by_cause(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
+    """Return cause → its (2, runs) counts, of targets without a range or velocity; none for causes
+    that never occurred.
+    """
     lacks = {
         "what it hears of has no range and is not judged": rangeless,
         "who is there has no velocity yet and is not judged": unmoving,
@@ -214,7 +222,8 @@ def true_relative_positions_m(states: TrafficStates) -> FloatArray:
 def _group_by_row_and_tick(
     tick: IntArray, row: IntArray, measured: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return each entry's index of its row-tick pair, and all pairs' rows and measuring ticks.
+    """Return each entry's index among the distinct pairs of row and measuring tick, and the rows
+    and ticks of all pairs.
 
     `tick` is of a message's rows, `row` and `measured` of its entries.
     """

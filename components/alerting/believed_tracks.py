@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations, longest_axis_deviation
-from components.alerting.believed_positions import BelievedFlights, not_judged_counts
+from components.alerting.believed_positions import BelievedFlights, unjudged_counts_by_cause
 from components.alerting.others_tracks import OthersTracks
 from components.alerting.received import OwnPoses, ReceivedRows
 from components.estimation.frame import vectors_in_frame
@@ -23,7 +23,7 @@ from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.run_ticks import RunTicks, last_position_at_or_before
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.wake import Arrivals, Wake
-from dsa_des.record.failure_counts import add_cases
+from dsa_des.record.failure_counts import counts_with_cases_added
 
 # Upper triangle of a covariance in its columns.
 _PAIRS = tuple(COVARIANCE)
@@ -64,7 +64,9 @@ class EstimatedFlights:
         """Store each message row's confirmed and coasted tracks with a range, and when it came."""
         good = np.isin(tracks.track_status, (CONFIRMED, COASTED))
         run = came.run[rows_of_entries(tracks.offsets)]
-        self.rangeless = add_cases(self.rangeless, run[good & ~tracks.has_range], run[good])
+        self.rangeless = counts_with_cases_added(
+            self.rangeless, run[good & ~tracks.has_range], run[good]
+        )
         good &= tracks.has_range
         before = np.concatenate([[0], np.cumsum(good)])[tracks.offsets]
         begin = len(self._tracks) + before[:-1]
@@ -103,7 +105,8 @@ class EstimatedFlights:
         own_place: FloatArray,
         own_velocity: FloatArray | None = None,
     ) -> tuple[IntArray, IntArray, FloatArray, Deviations, FloatArray]:
-        """Return five arrays of tracks known at these instants, by instant and track number.
+        """Return five arrays of the tracks known at these instants: instant, track number, state,
+        deviations, age in s.
 
         They are the instant, number, state and deviations of each, and how old its last
         measurement is. `own_velocity` (north, east, down) tells which one is the ownship.
@@ -210,8 +213,10 @@ class BelievedTracks:
         self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often targets could not be judged, as reason to (2, runs) counts."""
-        return not_judged_counts(self._estimates.rangeless, self._unmoving)
+        """Return cause → (2, runs) counts: how often targets could not be judged for it, and of how
+        many cases.
+        """
+        return unjudged_counts_by_cause(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
         """Store the tracks of a tracker's message and when each of its rows came."""
@@ -235,7 +240,7 @@ class BelievedTracks:
         # Without two poses the ownship's own velocity is not known, and no relative one.
         known = np.isfinite(own["east_mps"])
         moving = known.nonzero()[0]
-        self._unmoving = add_cases(self._unmoving, asked.run[~known], asked.run)
+        self._unmoving = counts_with_cases_added(self._unmoving, asked.run[~known], asked.run)
         now = asked.take(moving)
         east, north, climb = (own[name][moving] for name in _OWN_VELOCITY)
         velocity_m_s = np.stack([north, east, -climb])

@@ -26,12 +26,12 @@ from components.alerting.received import OwnPoses
 from components.guidance.daidalus import ConfParameters
 from components.guidance.situation import State
 from components.messages.alerts import MOST_LEVELS, AlertLevels, AlertsOffered
-from components.messages.detections import names_of_rangeless_sensors
+from components.messages.detections import joined_names_if_all_rangeless
 from components.messages.fused import WITHOUT_POSE, FusedDetections
 from components.messages.state_tracks import StateTracks
 from components.messages.targets import TrafficStates
 from components.messages.tracks import Tracks
-from components.well_clear.separation import separation
+from components.well_clear.separation import present_and_projected_separation
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output, ScenePath
@@ -66,7 +66,7 @@ class DaidalusParameters(ConfParameters, ClockedParameters):
 
     @field_validator("conf", mode="after")
     @classmethod
-    def _readable(cls, value: Any) -> Any:
+    def _check_conf_readable(cls, value: Any) -> Any:
         configuration = read_conf(value)
         if configuration.most_levels > MOST_LEVELS:
             raise ValueError(
@@ -152,12 +152,14 @@ class DaidalusAlerting(Component):
                 f"{float(self.context.duration_s):g} s it scans once, which tells no velocity"
             )
         heard = [one for one in self.context.producers if one.port == self._source]
-        if blind := names_of_rangeless_sensors(heard):
+        if blind := joined_names_if_all_rangeless(heard):
             said.append(f"{blind} measures no range: nothing of what it hears of is judged")
         return said
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return how often flights could not be judged, as reason to (2, runs) counts."""
+        """Return cause → (2, runs) counts: how often flights could not be judged for it, and of how
+        many cases.
+        """
         return {} if self._roster is None else self._belief.failure_counts()
 
     def run(self, wake: Wake) -> AlertLevels | None:
@@ -219,7 +221,7 @@ class DaidalusAlerting(Component):
         )
         self._forget(asked, times, wake)
         lookahead_s = self._configuration["lookahead_time"]
-        result = separation(relative, lookahead_s, np.full(len(row), np.nan))
+        result = present_and_projected_separation(relative, lookahead_s, np.full(len(row), np.nan))
         times_s = np.where(np.isfinite(times_s), times_s, np.nan)
         numbered = range(1, len(self._alerter.levels) + 1)
         return AlertLevels(
@@ -248,7 +250,7 @@ class DaidalusAlerting(Component):
         self._memory.forget_runs_before(wake.first_run)
         # The next scans come after all of these.
         since = int(asked.tick.max()) - round(self._over_s * self.context.ticks_per_s)
-        self._own.separate_old_poses(since, wake, late_sights=self._source != "estimates")
+        self._own.set_aside_old_poses(since, wake, late_sights=self._source != "estimates")
 
 
 def _track_columns(flights: BelievedFlights) -> dict[str, AnyArray]:

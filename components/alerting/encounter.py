@@ -14,7 +14,7 @@ from components.alert_configuration.configuration import (
     uncertainty_bounds,
 )
 from components.alerting.levels import AlertPairs
-from components.flights.attitude import fit_path
+from components.flights.attitude import fit_velocity_and_acceleration
 from components.flights.sampled_flight import SampledTrajectory
 from components.formats.daa_file import DAIDALUS, EXTRA_COLUMNS, read_daa_samples
 from components.formats.recorded.traffic_of_files import TrafficChoice, read_traffic
@@ -79,7 +79,7 @@ def read_encounter(
     `TrafficFileError` with all problems of the file, also without velocities or with an alerter
     that is not there.
     """
-    samples, notes = _read_samples(path, choice)
+    samples, notes = _read_samples_and_notes(path, choice)
     problems = Problems(str(path))
     names = tuple(samples)
     own = samples[names[0]]
@@ -90,7 +90,7 @@ def read_encounter(
         for key, part in zip(("ve", "vn"), wind, strict=True):
             aircraft[key] = aircraft[key] - np.interp(aircraft["time"], own["time"], part)
     others = [samples[name] for name in names[1:]]
-    index, present = _simultaneous_samples(own["time"], others)
+    index, present = _sample_index_and_is_exact(own["time"], others)
     targets = {key: _select_samples([o[key] for o in others], index) for key in own}
     flat = "sx" in own
     state = _states_of_flat_file if flat else _states_of_geodetic_file
@@ -116,7 +116,7 @@ def read_encounter(
     )
 
 
-def _read_samples(
+def _read_samples_and_notes(
     path: str | PathLike[str], choice: TrafficChoice
 ) -> tuple[dict[str, Samples], tuple[str, ...]]:
     """Return a file's samples by aircraft name, and notes on assumptions made in reading."""
@@ -150,7 +150,7 @@ def _sample_flight(craft: SampledTrajectory, time_s: FloatArray, start_s: float)
     known_s, path = craft.sample_times_s, (craft.lat_deg, craft.lon_deg, craft.alt_m)
     velocity = craft.velocity_enu_mps
     if velocity is None:
-        velocity = fit_path(known_s, *path)[0]
+        velocity = fit_velocity_and_acceleration(known_s, *path)[0]
     state = craft.at(time_s)
     place = {"lat": state.lat_deg, "lon": state.lon_deg, "alt": state.alt_m}
     rates = {
@@ -172,8 +172,12 @@ def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
     return np.asarray(np.stack([own["ve"], own["vn"]]) - through_air)
 
 
-def _simultaneous_samples(own_s: FloatArray, others: list[Samples]) -> tuple[IntArray, BoolArray]:
-    """Return each target's sample index at each own time, and whether its time is exactly that."""
+def _sample_index_and_is_exact(
+    own_s: FloatArray, others: list[Samples]
+) -> tuple[IntArray, BoolArray]:
+    """Return the index of each target's first sample at or after each own time, and whether the two
+    times are equal.
+    """
     index = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
     index = np.minimum(index, np.array([len(other["time"]) - 1 for other in others]))
     times = _select_samples([other["time"] for other in others], index)

@@ -8,7 +8,7 @@ from components.alert_configuration.configuration import Alerter, Configuration,
 from components.alerting.memory import AlertMemory, MemoryRule
 from components.guidance.manoeuvre_kinds import manoeuvres_of_kind
 from components.guidance.situation import Detector, State
-from components.well_clear.detection import Bounds, detection_span, select_bounds
+from components.well_clear.detection import Bounds, select_bounds, violation_or_advisory_span
 from components.well_clear.relative_motion import is_surely_less
 from components.well_clear.volume import Relative
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -24,8 +24,8 @@ def levels_due_by_spread(
     intruder: State,
     bounds: Bounds | None,
 ) -> tuple[BoolArray, BoolArray]:
-    """Return two masks (n, levels): a conflict lies within a level's spreads before its alerting
-    time, and before its early one.
+    """Return two masks (n, levels): a conflict lies within a level's spread of own manoeuvres
+    before its alerting time, and before its early one.
     """
     count = len(own.up_m)
     due, early = (np.zeros((count, len(levels)), dtype=bool) for _ in range(2))
@@ -47,7 +47,7 @@ def levels_due_by_spread(
                     (due, level.alerting_time_s),
                     (early, level.early_alerting_time_s),
                 ):
-                    unsafe = conflicts.is_unsafe(0.0, horizon_s)
+                    unsafe = conflicts.is_in_or_behind_conflict(0.0, horizon_s)
                     met = (near & (unsafe[:, :-1] | unsafe[:, 1:])).any(axis=1)
                     level_due[part, number] |= met
     return due, early
@@ -99,7 +99,7 @@ def violation_times_s(
                     None if own_up_mps is None else (own_up_mps[0][part], own_up_mps[1][part])
                 )
                 of_part = select_bounds(bounds, part) if level.uncertain else None
-                known[key] = detection_span(
+                known[key] = violation_or_advisory_span(
                     level.volume, states, vertical, of_part, 0.0, lookahead_s
                 ).begin_s
             result[part, number] = known[key]
@@ -190,7 +190,7 @@ def alert_levels(
     rule, targets = memory_rule(configuration), np.arange(shape[1])
     memory = AlertMemory.new(rule, 0 * targets, targets)
     for row, now_s in enumerate(np.asarray(time_s).tolist()):
-        memory, now = memory.step(rule, now_s, present[row], due[row], early[row])
+        memory, now = memory.next_memory_and_levels(rule, now_s, present[row], due[row], early[row])
         level[row] = np.where(present[row], now, -1)
-        early_level[row] = memory.early_levels(rule, now_s, present[row])
+        early_level[row] = memory.early_levels_for_guidance(rule, now_s, present[row])
     return Alerts(level, violation_s, early_level)

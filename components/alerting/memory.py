@@ -46,7 +46,7 @@ class AlertMemory(KeyedTable):
             asked_s=np.full(count, np.nan),
         )
 
-    def step(
+    def next_memory_and_levels(
         self,
         rule: MemoryRule,
         now_s: float | FloatArray,
@@ -90,9 +90,11 @@ class AlertMemory(KeyedTable):
         )
         return after, level
 
-    def early_levels(self, rule: MemoryRule, now_s: float, present: BoolArray) -> IntArray:
-        """Return each present target's level if it rose before now, so that its early alerting time
-        counts for guidance; else 0.
+    def early_levels_for_guidance(
+        self, rule: MemoryRule, now_s: float, present: BoolArray
+    ) -> IntArray:
+        """Return the level of each present target whose level rose before now, else 0: only then
+        may its early alerting time count for guidance.
         """
         counts = present & (rule.hysteresis_s > 0.0) & (self.risen_s < now_s)
         return np.where(counts, np.maximum(self.output, 0), 0)
@@ -133,9 +135,9 @@ class LevelMemory:
         if len(number) == 0:
             return level
         present = np.ones(len(number), dtype=bool) if present is None else present
-        index = self._rows_of_targets(RunTicks(run, number))
+        index = self._find_or_add_target_rows(RunTicks(run, number))
         for rows in indices_by_occurrence(index):
-            part, level[rows] = self._known.take(index[rows]).step(
+            part, level[rows] = self._known.take(index[rows]).next_memory_and_levels(
                 self._rule, now_s[rows], present[rows], due[rows], early[rows]
             )
             self._write_rows(index[rows], part)
@@ -158,7 +160,7 @@ class LevelMemory:
         for name, values in part.columns.items():
             self._known.columns[name][..., which] = values
 
-    def _rows_of_targets(self, those: RunTicks) -> IntArray:
+    def _find_or_add_target_rows(self, those: RunTicks) -> IntArray:
         """Return each target's row in the memory, by run and number, adding unknown ones first."""
         known = self._known.keys
         index = last_position_at_or_before(known, those)

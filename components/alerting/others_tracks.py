@@ -6,13 +6,13 @@ from typing import Self
 import numpy as np
 
 from components.alert_configuration.configuration import Deviations, longest_axis_deviation
-from components.association.assignment import gate_threshold
+from components.association.assignment import squared_gate_distance
 from components.estimation.batched import cholesky, mahalanobis_squared
 from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
 from components.messages.detections import SensorOffer, offers_of_fused_sensors
 from components.messages.state_tracks import COVARIANCE, StateTracks
-from components.navigation.errors import navigation_noise_deviations
+from components.navigation.errors import position_and_attitude_deviations
 from dsa_des.arrays.keyed_table import KeyedTable
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Context
@@ -29,14 +29,16 @@ class OthersTracks:
 
     @classmethod
     def from_context(cls, context: Context, probability: float, intensity_m2_s3: float) -> Self:
-        """Return a block's instance; producers' offers tell sensors that are on other platforms."""
+        """Return an instance for a block; producers' offers tell which sensors other platforms
+        carry.
+        """
         others = frozenset(
             name
             for name, offer in offers_of_fused_sensors(context.producers).items()
             if isinstance(offer, SensorOffer) and offer.platform not in ("", context.platform)
         )
         motion = ConstantVelocity(intensity_m2_s3)
-        return cls(others, probability, motion, navigation_noise_deviations(context)[0])
+        return cls(others, probability, motion, position_and_attitude_deviations(context)[0])
 
     def are_of_others_only(self, tracks: StateTracks) -> BoolArray:
         """Return a mask of the tracks to which only sensors on other platforms have contributed."""
@@ -81,7 +83,7 @@ class OthersTracks:
             first = np.ones(len(order), dtype=bool)
             first[1:] = instant[order][1:] != instant[order][:-1]
             nearest = order[first]
-            inside = far[nearest] <= gate_threshold(self.own_gate_probability, 6)
+            inside = far[nearest] <= squared_gate_distance(self.own_gate_probability, 6)
             is_own[nearest[inside]] = True
         return is_own, deviations
 

@@ -60,23 +60,27 @@ class OwnPoses:
         """Store the ownship's poses of a traffic message, and when each of its rows came."""
         position = np.radians(states.own_lat_deg), np.radians(states.own_lon_deg), states.own_alt_m
         angles = states.own_yaw_rad, states.own_pitch_rad, states.own_roll_rad
-        self._store_newest(
+        self._store_not_overtaken_poses(
             self._poses.append(
                 came, tick=states.tick, place=np.array(position), attitude=np.array(angles)
             )
         )
 
-    def _store_newest(self, poses: ReceivedRows) -> None:
+    def _store_not_overtaken_poses(self, poses: ReceivedRows) -> None:
         # One that a newer one overtook on the way tells nothing any more.
-        newest = RunTicks(poses.replica, poses.tick).running_latest()
+        newest = RunTicks(poses.replica, poses.tick).running_largest_tick()
         self._poses = poses.take(poses.tick >= newest.tick)
 
     def has_pose_by(self, asked: RunTicks) -> BoolArray:
         """Return whether any pose had been received by each of the given instants."""
         return np.asarray(self._poses.last_row_index(asked) >= 0)
 
-    def pose_index(self, measured: RunTicks, came: RunTicks, asked: BoolArray) -> IntArray:
-        """Return the index of the newest received pose at or before each measurement; else -1."""
+    def pose_index_at_measurement(
+        self, measured: RunTicks, came: RunTicks, asked: BoolArray
+    ) -> IntArray:
+        """Return the index of the newest pose of or before each measurement, of those received by
+        `came`; -1 for none.
+        """
         index = np.minimum(
             last_position_at_or_before(self._pose_ticks, measured), self._poses.last_row_index(came)
         )
@@ -84,9 +88,9 @@ class OwnPoses:
         if self._old and bool((asked & (index <= first)).any()):
             every = ReceivedRows.concatenate([*self._old, self._poses])
             order = every.instants.sort_indices()
-            self._store_newest(every if order is None else every.take(order))
+            self._store_not_overtaken_poses(every if order is None else every.take(order))
             self._old = []
-            return self.pose_index(measured, came, asked)
+            return self.pose_index_at_measurement(measured, came, asked)
         return index
 
     def attitude_rad(self, place: IntArray) -> FloatArray:
@@ -118,8 +122,10 @@ class OwnPoses:
             "climb_mps": (now[2] - then[2]) / time_s,
         }
 
-    def separate_old_poses(self, tick: int, wake: Wake, *, late_sights: bool) -> None:
-        """Move poses older than a tick away, kept only if `late_sights`; drop ended runs' poses."""
+    def set_aside_old_poses(self, tick: int, wake: Wake, *, late_sights: bool) -> None:
+        """Set aside (without `late_sights`: drop) poses from before a tick, and drop those of ended
+        runs.
+        """
         if len(self._poses) and self._poses.replica[0] < wake.first_run:
             self._poses = self._poses.take(self._poses.replica >= wake.first_run)
             self._old = []

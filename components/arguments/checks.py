@@ -51,7 +51,7 @@ def refuse(name: str, array: FloatArray, bad: NDArray[np.bool_], rule: str) -> N
         raise ValueError(f"{name} is {shown}: it must {rule}")
 
 
-def positive(name: str, value: ArrayLike) -> FloatArray:
+def check_positive(name: str, value: ArrayLike) -> FloatArray:
     """Return `value` as float64, all of it finite and above 0."""
     array = check_numbers(name, value)
     refuse(name, array, ~((array > 0.0) & np.isfinite(array)), "be finite and above 0")
@@ -65,8 +65,8 @@ def check_not_negative(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
-def finite(name: str, value: ArrayLike) -> FloatArray:
-    """Return `value` as float64, all of it finite, of any size; see also `check_squarable`."""
+def check_finite(name: str, value: ArrayLike) -> FloatArray:
+    """Return `value` as float64, all of it finite, however large (see `check_squarable`)."""
     array = check_numbers(name, value)
     refuse(name, array, ~np.isfinite(array), "be finite")
     return array
@@ -111,7 +111,7 @@ def check_angle_rad(name: str, value: ArrayLike) -> FloatArray:
     Values beyond 1e15 rad carry no direction any more; they are reduced only so that sums of two
     of them cannot overflow. Everything smaller passes through unchanged, to the bit.
     """
-    array = finite(name, value)
+    array = check_finite(name, value)
     if np.any(np.abs(array) > _LARGEST_MEANINGFUL_ANGLE_RAD):
         array = np.where(
             np.abs(array) > _LARGEST_MEANINGFUL_ANGLE_RAD, np.fmod(array, 2.0 * np.pi), array
@@ -119,7 +119,7 @@ def check_angle_rad(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
-def check_frequency(frequency_hz: ArrayLike, highest_hz: float) -> FloatArray:
+def checked_frequency_ghz(frequency_hz: ArrayLike, highest_hz: float) -> FloatArray:
     """Return the frequency in GHz, from 1 GHz to the highest a Recommendation covers."""
     frequency = check_numbers("frequency_hz", frequency_hz)
     refuse(
@@ -167,7 +167,7 @@ def check_probability(name: str, value: ArrayLike) -> FloatArray:
     return array
 
 
-def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
+def check_one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of the allowed names, or name the nearest one."""
     names = tuple(allowed)
     if isinstance(value, str) and value in names:
@@ -180,11 +180,11 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
 
 def check_swerling_model(value: object) -> str:
     """Return the canonical name of a Swerling model; swerling5 is another name of swerling0."""
-    name = one_of("model", value, (*MODELS, *_ALIASES))
+    name = check_one_of("model", value, (*MODELS, *_ALIASES))
     return _ALIASES.get(name, name)
 
 
-def contiguous(name: str, value: ArrayLike) -> FloatArray:
+def contiguous_float64(name: str, value: ArrayLike) -> FloatArray:
     """Return an argument as a C-contiguous float64 array; ValueError if it holds no numbers.
 
     Contiguous because NumPy's loops over sin, cos or arctan2 may take another code path, with
@@ -225,7 +225,7 @@ def check_squarable(name: str, value: ArrayLike) -> FloatArray:
     ValueError
         Not a number, not finite, or larger than 1e150 in size.
     """
-    array = contiguous(name, value)
+    array = contiguous_float64(name, value)
     require_between(name, array, -LARGEST, LARGEST, f"be finite and within ±{LARGEST:g}")
     return array
 
@@ -254,7 +254,8 @@ def check_positions(
     alt_m: ArrayLike,
     validate: bool = True,
 ) -> tuple[tuple[FloatArray, ...], tuple[int, ...]]:
-    """Check two geodetic positions and return them as arrays of at least one axis.
+    """Return six checked arrays (own latitude, longitude, altitude, then the target's; at least one
+    axis), and their broadcast shape.
 
     Parameters
     ----------
@@ -280,12 +281,12 @@ def check_positions(
         [-6e6, 1e9] m, NaN anywhere, or shapes that do not fit.
     """
     named = {
-        "own_lat_deg": contiguous("own_lat_deg", own_lat_deg),
-        "own_lon_deg": contiguous("own_lon_deg", own_lon_deg),
-        "own_alt_m": contiguous("own_alt_m", own_alt_m),
-        "lat_deg": contiguous("lat_deg", lat_deg),
-        "lon_deg": contiguous("lon_deg", lon_deg),
-        "alt_m": contiguous("alt_m", alt_m),
+        "own_lat_deg": contiguous_float64("own_lat_deg", own_lat_deg),
+        "own_lon_deg": contiguous_float64("own_lon_deg", own_lon_deg),
+        "own_alt_m": contiguous_float64("own_alt_m", own_alt_m),
+        "lat_deg": contiguous_float64("lat_deg", lat_deg),
+        "lon_deg": contiguous_float64("lon_deg", lon_deg),
+        "alt_m": contiguous_float64("alt_m", alt_m),
     }
     shape = named["alt_m"].shape
     # One observer for all targets of a row is what every scan has.

@@ -14,8 +14,10 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
 @lru_cache(maxsize=64)
-def gate_threshold(probability: float, size: int) -> float:
-    """Return the squared Mahalanobis gate of a detection of `size` quantities at a probability."""
+def squared_gate_distance(probability: float, size: int) -> float:
+    """Return the squared Mahalanobis distance within which a detection of `size` quantities lies
+    with this probability.
+    """
     low, high = 0.0, 1.0
     while 1.0 - probability < _chi_square_survival(high, size):
         high *= 2.0
@@ -65,7 +67,7 @@ def cluster_labels(track: IntArray, detection: IntArray) -> IntArray:
         of_track = lower
 
 
-def group_by_label(label: IntArray) -> list[IntArray]:
+def pair_indices_by_cluster(label: IntArray) -> list[IntArray]:
     """Return for each cluster the indices of its pairs, ascending; clusters are sorted by label."""
     if len(label) == 0:
         return []
@@ -74,7 +76,7 @@ def group_by_label(label: IntArray) -> list[IntArray]:
     return np.split(order, cuts)
 
 
-def nearest_pairs(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
+def greedy_pair_indices(track: IntArray, detection: IntArray, distance: FloatArray) -> IntArray:
     """Return pairs chosen greedily (indices): repeatedly the closest free track and detection."""
     taken = [np.flatnonzero(is_only_pair_of_both(track, detection))]
     left = np.flatnonzero(~is_only_pair_of_both(track, detection))
@@ -91,23 +93,29 @@ def nearest_pairs(track: IntArray, detection: IntArray, distance: FloatArray) ->
     return np.sort(np.concatenate(taken))
 
 
-def global_nearest_pairs(
+def least_total_pair_indices(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
-    """Return the pairs (indices) of least total distance, plus `missing` per unpaired track."""
+    """Return the indices of the pairs of least total distance, where a track left without a pair
+    costs `missing`.
+    """
     single = is_only_pair_of_both(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)
     price = np.broadcast_to(missing, distance.shape)
-    for part in group_by_label(cluster_labels(track[left], detection[left])):
+    for part in pair_indices_by_cluster(cluster_labels(track[left], detection[left])):
         pairs = left[part]
         taken.append(
-            pairs[_solve_assignment(track[pairs], detection[pairs], distance[pairs], price[pairs])]
+            pairs[
+                _least_cost_pair_indices(
+                    track[pairs], detection[pairs], distance[pairs], price[pairs]
+                )
+            ]
         )
     return np.sort(np.concatenate(taken))
 
 
-def _solve_assignment(
+def _least_cost_pair_indices(
     track: IntArray, detection: IntArray, distance: FloatArray, price: FloatArray
 ) -> IntArray:
     from scipy.optimize import linear_sum_assignment

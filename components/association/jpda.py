@@ -12,7 +12,7 @@ AES 50 (2014).
 
 import numpy as np
 
-from components.association.assignment import cluster_labels, group_by_label
+from components.association.assignment import cluster_labels, pair_indices_by_cluster
 from dsa_des.arrays.types import FloatArray, IntArray
 
 #: Detections in a cluster up to which marginals are exact: a sum over 2^10 sets for each track.
@@ -22,10 +22,12 @@ _SETTLED = 1e-12
 _MOST_ROUNDS = 10_000
 
 
-def marginals(
+def pair_probabilities(
     track: IntArray, detection: IntArray, weight: FloatArray, exact_up_to: int = EXACT_UP_TO
 ) -> FloatArray:
-    """Return each pair's joint association probability; a track's lack to 1 is that of a miss."""
+    """Return each pair's joint association probability; what a track's sum lacks to 1 is the
+    probability that it is missed.
+    """
     result = np.empty(len(track))
     if len(track) == 0:
         return result
@@ -37,18 +39,22 @@ def marginals(
     total = 1.0 + np.bincount(track[simple], weights=weight[simple], minlength=len(mixed_up))
     result[simple] = weight[simple] / total[track[simple]]
     left = np.flatnonzero(~simple)
-    for part in group_by_label(cluster_labels(track[left], detection[left])):
+    for part in pair_indices_by_cluster(cluster_labels(track[left], detection[left])):
         pairs = left[part]
         tracks, row = np.unique(track[pairs], return_inverse=True)
         detections, column = np.unique(detection[pairs], return_inverse=True)
         weights = np.zeros((len(tracks), len(detections)))
         weights[row, column] = weight[pairs]
-        solve = exact_marginals if len(detections) <= exact_up_to else propagate_beliefs
+        solve = (
+            exact_pair_probabilities
+            if len(detections) <= exact_up_to
+            else approximate_pair_probabilities
+        )
         result[pairs] = solve(weights)[row, column]
     return result
 
 
-def exact_marginals(weights: FloatArray) -> FloatArray:
+def exact_pair_probabilities(weights: FloatArray) -> FloatArray:
     """Return exact probabilities of the pairs of one cluster, (tracks, detections), from weights
     relative to a miss, 0 for no pair.
     """
@@ -77,7 +83,7 @@ def exact_marginals(weights: FloatArray) -> FloatArray:
     return result
 
 
-def propagate_beliefs(weights: FloatArray) -> FloatArray:
+def approximate_pair_probabilities(weights: FloatArray) -> FloatArray:
     """Return approximate probabilities of the pairs of one cluster, (tracks, detections), by belief
     propagation.
 

@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
-    check_frequency,
     check_not_negative,
+    check_one_of,
     check_within,
-    one_of,
+    checked_frequency_ghz,
     refuse,
     unflatten,
 )
@@ -54,7 +54,7 @@ def gas_specific_attenuation(
     1013.25 hPa there, which gives 1 % more; to repeat them, add the vapour's pressure to theirs.
     """
     shape, (frequency, pressure, temperature, density) = broadcast_flat(
-        frequency_hz=check_frequency(frequency_hz, HIGHEST_FREQUENCY_HZ),
+        frequency_hz=checked_frequency_ghz(frequency_hz, HIGHEST_FREQUENCY_HZ),
         pressure_hpa=check_within("pressure_hpa", pressure_hpa, 0.0, 1e4, "hPa"),
         temperature_k=check_within("temperature_k", temperature_k, 150.0, 350.0, "K"),
         vapour_density_g_m3=check_not_negative("vapour_density_g_m3", vapour_density_g_m3),
@@ -166,7 +166,7 @@ def rain_coefficients(frequency_hz: float) -> RainCoefficients:
     -----
     Recommendation ITU-R P.838-3 (03/2005), eq. 2 and 3 with Tables 1-4.
     """
-    decades = math.log10(float(check_frequency(float(frequency_hz), HIGHEST_FREQUENCY_HZ)))
+    decades = math.log10(float(checked_frequency_ghz(float(frequency_hz), HIGHEST_FREQUENCY_HZ)))
     value = {"k_horizontal": 0.0, "k_vertical": 0.0, "alpha_horizontal": 0.0, "alpha_vertical": 0.0}
     for row in read_csv_rows("rain_coefficients"):
         a, b = float(row["a"]), float(row["b"])
@@ -182,7 +182,7 @@ def rain_coefficients(frequency_hz: float) -> RainCoefficients:
     )
 
 
-def polarisation_balance(polarisation: str | float) -> float:
+def horizontal_vertical_balance(polarisation: str | float) -> float:
     """Return cos 2τ of a polarisation: 1 horizontal, -1 vertical, 0 circular.
 
     Parameters
@@ -196,7 +196,7 @@ def polarisation_balance(polarisation: str | float) -> float:
         If the name is unknown (the nearest one is named) or the tilt outside ±π.
     """
     if isinstance(polarisation, str):
-        return POLARISATIONS[one_of("polarisation", polarisation, POLARISATIONS)]
+        return POLARISATIONS[check_one_of("polarisation", polarisation, POLARISATIONS)]
     return math.cos(
         2.0 * float(check_within("polarisation", polarisation, -math.pi, math.pi, "rad"))
     )
@@ -233,7 +233,7 @@ def rain_specific_attenuation(
             "elevation_rad", elevation_rad, -math.pi / 2, math.pi / 2, "rad"
         ),
     )
-    balance = np.cos(elevation) ** 2 * polarisation_balance(polarisation)
+    balance = np.cos(elevation) ** 2 * horizontal_vertical_balance(polarisation)
     return unflatten(coefficients.specific_attenuation_db_km(rate, balance), shape)
 
 
@@ -256,7 +256,7 @@ def fog_specific_attenuation_coefficient(frequency_hz: ArrayLike, temperature_k:
     double-Debye permittivity.
     """
     shape, (f, temperature) = broadcast_flat(
-        frequency_hz=check_frequency(frequency_hz, HIGHEST_FREQUENCY_IN_FOG_HZ),
+        frequency_hz=checked_frequency_ghz(frequency_hz, HIGHEST_FREQUENCY_IN_FOG_HZ),
         temperature_k=check_within("temperature_k", temperature_k, 233.15, 323.15, "K"),
     )
     excess = 300.0 / temperature - 1.0

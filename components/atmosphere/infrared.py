@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
-    finite,
-    positive,
+    check_positive,
     unflatten,
 )
 from components.atmosphere.standard_atmosphere import (
@@ -69,8 +69,8 @@ def precipitable_water_mm(
     """
     shape, (distance, own, target, density) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        own_alt_m=finite("own_alt_m", own_alt_m),
-        target_alt_m=finite("target_alt_m", target_alt_m),
+        own_alt_m=check_finite("own_alt_m", own_alt_m),
+        target_alt_m=check_finite("target_alt_m", target_alt_m),
         density=check_not_negative("sea_level_vapour_density_g_m3", sea_level_vapour_density_g_m3),
     )
     low, climb = np.minimum(own, target), np.abs(target - own) / _VAPOUR_SCALE_HEIGHT_M
@@ -108,7 +108,7 @@ def mid_wave_transmission(water_mm: ArrayLike) -> Any:
     return unflatten(total, shape)
 
 
-def continuum_per_km(
+def continuum_absorption_per_km(
     wavelength_um: ArrayLike,
     *,
     vapour_density_g_m3: ArrayLike,
@@ -134,10 +134,10 @@ def continuum_per_km(
     square of the humidity.
     """
     shape, (wavelength, density, temperature, pressure) = broadcast_flat(
-        wavelength_um=positive("wavelength_um", wavelength_um),
+        wavelength_um=check_positive("wavelength_um", wavelength_um),
         vapour_density_g_m3=check_not_negative("vapour_density_g_m3", vapour_density_g_m3),
-        temperature_k=positive("temperature_k", temperature_k),
-        pressure_hpa=positive("pressure_hpa", pressure_hpa),
+        temperature_k=check_positive("temperature_k", temperature_k),
+        pressure_hpa=check_positive("pressure_hpa", pressure_hpa),
     )
     return unflatten(
         _water_vapour_continuum_per_km(wavelength, density, temperature, pressure), shape
@@ -165,15 +165,15 @@ def long_wave_transmission(
 ) -> Any:
     """Return the 8-12 µm transmission (0 to 1) of clear air, the mean over the band.
 
-    The water vapour continuum (`continuum_per_km`) in the standard atmosphere, whose vapour
-    density at sea level is given, along a straight path on which altitude grows evenly. Lines of
-    water vapour and carbon dioxide are left out: they take a further 3 to 8 % per 10 km.
+    The water vapour continuum (`continuum_absorption_per_km`) in the standard atmosphere, whose
+    vapour density at sea level is given, along a straight path on which altitude grows evenly.
+    Lines of water vapour and carbon dioxide are left out: they take a further 3 to 8 % per 10 km.
     Arguments are those of `precipitable_water_mm`.
     """
     shape, (distance, own, target) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        own_alt_m=finite("own_alt_m", own_alt_m),
-        target_alt_m=finite("target_alt_m", target_alt_m),
+        own_alt_m=check_finite("own_alt_m", own_alt_m),
+        target_alt_m=check_finite("target_alt_m", target_alt_m),
     )
     first, last = BANDS["lwir"]
     wavelengths = (0.5 * (first + last) + 0.5 * (last - first) * _NODES).tolist()
@@ -235,7 +235,7 @@ def haze_extinction_ratio_at(visibility_m: ArrayLike, wavelength_um: float) -> A
     q = np.select(
         [km > 50.0, km > 6.0, km > 1.0, km > 0.5], [1.6, 1.3, 0.16 * km + 0.34, km - 0.5], 0.0
     )
-    return np.power(float(positive("wavelength_um", wavelength_um)) / _VISIBLE_UM, -q)
+    return np.power(float(check_positive("wavelength_um", wavelength_um)) / _VISIBLE_UM, -q)
 
 
 def band_extinction_per_m(

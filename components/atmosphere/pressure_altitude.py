@@ -54,18 +54,22 @@ class Air:
     def pressure_altitude_m(self, height_m: ArrayLike) -> Any:
         """Return the pressure altitude, m, at heights of -5 to 30 km above the ellipsoid."""
         height = check_within("height_m", height_m, LOWEST_M, HIGHEST_M, "m") - self.geoid_m
-        return _STANDARD.height_m(self._column.log_pressure_drop(height) - self._qnh_log_ratio)
+        return _STANDARD.height_of_pressure_drop_m(
+            self._column.log_pressure_drop(height) - self._log_qnh_over_standard
+        )
 
-    def height_m(self, altitude_m: ArrayLike) -> Any:
+    def height_of_pressure_altitude_m(self, altitude_m: ArrayLike) -> Any:
         """Return heights above the ellipsoid, m, where altimeters read these pressure altitudes."""
         altitude = check_within("altitude_m", altitude_m, LOWEST_M, HIGHEST_M, "m")
         return (
-            self._column.height_m(_STANDARD.log_pressure_drop(altitude) + self._qnh_log_ratio)
+            self._column.height_of_pressure_drop_m(
+                _STANDARD.log_pressure_drop(altitude) + self._log_qnh_over_standard
+            )
             + self.geoid_m
         )
 
     @property
-    def _qnh_log_ratio(self) -> float:
+    def _log_qnh_over_standard(self) -> float:
         return float(np.log(self.qnh_hpa / STANDARD_HPA))
 
     @cached_property
@@ -121,7 +125,7 @@ class _AirColumn:
         falling = -_HYDROSTATIC_K_M / even * np.log1p(-lapse * height_m / kelvin)
         return np.where(lapse == 0.0, _HYDROSTATIC_K_M * height_m / kelvin, falling)
 
-    def height_m(self, drop: FloatArray) -> FloatArray:
+    def height_of_pressure_drop_m(self, drop: FloatArray) -> FloatArray:
         """Return heights above sea level, m, over which the logarithm of pressure falls so much."""
         layer = np.searchsorted(self._from_drop, drop, side="right")
         lapse, kelvin = self._lapse_k_m[layer], self._base_k[layer]

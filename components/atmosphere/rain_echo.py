@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
     check_numbers,
-    finite,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
@@ -39,7 +39,7 @@ def rain_reflectivity_per_m(rain_rate_mm_h: ArrayLike, wavelength_m: float) -> A
     large (12 dB at 94 GHz and 4 mm/h).
     """
     rate = check_not_negative("rain_rate_mm_h", rain_rate_mm_h)
-    wave = float(positive("wavelength_m", wavelength_m))
+    wave = float(check_positive("wavelength_m", wavelength_m))
     z_m3 = 200e-18 * rate**1.6
     return (math.pi**5 * DIELECTRIC_FACTOR / wave**4 * z_m3)[()]
 
@@ -70,11 +70,11 @@ def rain_volume_m3(
         ("elevation_beamwidth_rad", elevation_beamwidth_rad),
         ("range_resolution_m", range_resolution_m),
     ):
-        positive(name, value)
+        check_positive(name, value)
     shape, (distance, elevation, height) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        elevation_rad=finite("elevation_rad", elevation_rad),
-        alt_m=finite("alt_m", alt_m),
+        elevation_rad=check_finite("elevation_rad", elevation_rad),
+        alt_m=check_finite("alt_m", alt_m),
     )
     solid = math.pi * azimuth_beamwidth_rad * elevation_beamwidth_rad / (8.0 * _LN_2)
     spread = distance * np.cos(elevation) * elevation_beamwidth_rad / math.sqrt(16.0 * _LN_2)
@@ -98,9 +98,10 @@ def rain_shell_m3(
 
     2 pi R ΔR times the height of the shell in which it rains (Archimedes).
     """
-    positive("range_resolution_m", range_resolution_m)
+    check_positive("range_resolution_m", range_resolution_m)
     shape, (distance, own) = broadcast_flat(
-        range_m=check_not_negative("range_m", range_m), own_alt_m=finite("own_alt_m", own_alt_m)
+        range_m=check_not_negative("range_m", range_m),
+        own_alt_m=check_finite("own_alt_m", own_alt_m),
     )
     top = np.clip(highest_m - own, -distance, distance)
     bottom = np.clip(lowest_m - own, -distance, distance)
@@ -125,7 +126,7 @@ def rain_velocity_deviation_m_s(
     """
     shape, (distance, elevation) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        elevation_rad=finite("elevation_rad", elevation_rad),
+        elevation_rad=check_finite("elevation_rad", elevation_rad),
     )
     shear = 0.42 * _SHEAR_PER_S * elevation_beamwidth_rad * distance * np.cos(elevation)
     shear = np.minimum(shear, _MOST_SHEAR_M_S)

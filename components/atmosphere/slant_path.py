@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
     check_numbers,
-    finite,
     refuse,
     unflatten,
 )
@@ -21,7 +21,7 @@ from components.atmosphere.attenuation import (
     RainCoefficients,
     fog_specific_attenuation,
     gas_specific_attenuation,
-    polarisation_balance,
+    horizontal_vertical_balance,
     rain_coefficients,
 )
 from components.atmosphere.standard_atmosphere import (
@@ -118,11 +118,11 @@ def attenuation_table(
         )
     return AttenuationTable(
         frequency_hz=float(frequency_hz),
-        gas=_gas_nodes(frequency_hz, vapour_density_g_m3) if gas else None,
+        gas=_gas_values_slopes_totals(frequency_hz, vapour_density_g_m3) if gas else None,
         rain=rain_coefficients(frequency_hz) if rain_rate > 0.0 else None,
         rain_rate_mm_h=rain_rate,
         rain_height_m=float(rain_height_m),
-        rain_balance=polarisation_balance(polarisation),
+        rain_balance=horizontal_vertical_balance(polarisation),
         fog_db_km=float(fog_specific_attenuation(frequency_hz, water, fog_temperature_k))
         if water > 0.0
         else 0.0,
@@ -131,7 +131,7 @@ def attenuation_table(
     )
 
 
-def _gas_nodes(
+def _gas_values_slopes_totals(
     frequency_hz: float, vapour_density_g_m3: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     altitude = BOTTOM_M + STEP_M * np.arange(round((TOP_M - BOTTOM_M) / STEP_M) + 1)
@@ -189,8 +189,8 @@ def one_way_attenuation_db(
     """
     shape, (distance, own, target) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        own_alt_m=finite("own_alt_m", own_alt_m),
-        target_alt_m=finite("target_alt_m", target_alt_m),
+        own_alt_m=check_finite("own_alt_m", own_alt_m),
+        target_alt_m=check_finite("target_alt_m", target_alt_m),
     )
     low, high = np.minimum(own, target), np.maximum(own, target)
     mean_db_km = np.zeros_like(distance)
@@ -222,8 +222,8 @@ def _mean_gas_attenuation_db_km(
     low: FloatArray, high: FloatArray, gas: FloatArray, slope: FloatArray, total: FloatArray
 ) -> FloatArray:
     last = len(total) - 2
-    i, t = _node_below(low, last)
-    j, s = _node_below(high, last)
+    i, t = _node_index_and_steps_above(low, last)
+    j, s = _node_index_and_steps_above(high, last)
     at_i, slope_i = gas.take(i), slope.take(i)
     in_one_step = at_i + slope_i * (0.5 * (t + s))
     to_next_node = (1.0 - t) * (at_i + slope_i * (0.5 * (1.0 + t)))
@@ -235,7 +235,7 @@ def _mean_gas_attenuation_db_km(
     return np.where(same, in_one_step, (to_next_node + whole_steps + from_last_node) / steps)
 
 
-def _node_below(altitude_m: FloatArray, last: int) -> tuple[Any, FloatArray]:
+def _node_index_and_steps_above(altitude_m: FloatArray, last: int) -> tuple[Any, FloatArray]:
     """Return the table's node at or below each altitude (index), and the steps above that node."""
     x = (altitude_m - BOTTOM_M) * (1.0 / STEP_M)
     below = np.minimum(np.maximum(np.floor(x), 0.0), float(last))

@@ -17,7 +17,7 @@ from components.arguments.checks import (
     broadcast_flat,
     check_not_negative,
     check_numbers,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
@@ -55,7 +55,7 @@ def fog_visibility_m(
     """
     shape, (water, number) = broadcast_flat(
         liquid_water_g_m3=check_not_negative("liquid_water_g_m3", liquid_water_g_m3),
-        droplets_per_cm3=positive("droplets_per_cm3", droplets_per_cm3),
+        droplets_per_cm3=check_positive("droplets_per_cm3", droplets_per_cm3),
     )
     with np.errstate(under="ignore", over="ignore"):  # ends of the number range
         product = water * number

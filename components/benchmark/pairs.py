@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from statistics import median
 from typing import Any
 
-from components.benchmark.scenes import CLOCKED, load_case_scene, select_cases, time_engine_run
+from components.benchmark.scenes import CLOCKED, load_case_scene, select_cases, time_build_and_run
 from components.examples import configs_folder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -102,11 +102,11 @@ def measure_pairs(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     (pair,) = (pair for pair in PAIRS if pair.name == name)
     forms = pair.forms(pair.case, quick)
     for scene in forms:
-        time_engine_run(scene, [], MemorySink())
+        time_build_and_run(scene, [], MemorySink())
     ratios, times = [], []
     for number in range(4 * repeats):
         order = forms if number % 2 else forms[::-1]
-        spent = {id(scene): sum(time_engine_run(scene, [], MemorySink())[:2]) for scene in order}
+        spent = {id(scene): sum(time_build_and_run(scene, [], MemorySink())[:2]) for scene in order}
         ratios.append(spent[id(forms[0])] / spent[id(forms[1])])
         times.append(spent[id(forms[0])])
     simulated_s = float(Simulation(forms[0]).duration_s)

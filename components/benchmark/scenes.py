@@ -126,16 +126,16 @@ def measure_scene(name: str, quick: bool, repeats: int) -> dict[str, Any]:
     scenes = random_phase_replicas(scene, replicas) if replicas else []
     built, engine, plain = [], [], []
     units = 0
-    time_engine_run(scene, scenes, MemorySink())
+    time_build_and_run(scene, scenes, MemorySink())
     memory_mb = peak_memory_mb()  # before anything but the engine has run
-    yardstick_run = _prepare_yardstick(case, scene, scenes)
+    yardstick_run = _prepare_plain_loop_timing(case, scene, scenes)
     for _ in range(repeats):
-        build_s, run_s, units = time_engine_run(scene, scenes, MemorySink())
+        build_s, run_s, units = time_build_and_run(scene, scenes, MemorySink())
         built.append(build_s)
         engine.append(run_s)
         plain.append(yardstick_run())
     # Afterwards, as Arrow's memory slows what comes after it; its first file loads libraries.
-    parquet = [time_engine_run(scene, scenes, None)[1] for _ in range(repeats + 1)][1:]
+    parquet = [time_build_and_run(scene, scenes, None)[1] for _ in range(repeats + 1)][1:]
     whole = [build_s + run_s for build_s, run_s in zip(built, engine, strict=True)]
     seconds_per_unit = median(plain)
     simulated_s = float(Simulation(scene).duration_s) * max(1, len(scenes))
@@ -163,10 +163,11 @@ def _cpu_seconds_of(run: Callable[[], Any]) -> float:
     return time.process_time() - started
 
 
-def time_engine_run(
+def time_build_and_run(
     scene: Scene, scenes: list[Scene], sink: Sink | None
 ) -> tuple[float, float, int]:
-    """Run a scene once; return CPU seconds of building and of running, and count target-scans.
+    """Build and run a scene once; return CPU seconds of building, of running, and scans times
+    targets.
 
     Without replicas in `scenes` a single run of `scene`; without a sink into Parquet in passing.
     """
@@ -174,7 +175,7 @@ def time_engine_run(
         from dsa_des.record.arrow import ParquetSink
 
         with tempfile.TemporaryDirectory() as folder:
-            return time_engine_run(scene, scenes, ParquetSink(Path(folder)))
+            return time_build_and_run(scene, scenes, ParquetSink(Path(folder)))
     recorder = Recorder([sink])
     started = time.process_time()
     simulation = (
@@ -195,16 +196,20 @@ def _count_scans(simulation: Simulation) -> int:
     result = 0
     for run in range(simulation.runs.count):
         simulation.runs.going = range(run, run + 1)
-        result += sum(len(clock.between(0, simulation.end_tick)[0]) for clock in clocks)
+        result += sum(len(clock.scans_between(0, simulation.end_tick)[0]) for clock in clocks)
     return result
 
 
-def _prepare_yardstick(
+def _prepare_plain_loop_timing(
     case: BenchmarkCase, scene: Scene, scenes: list[Scene]
 ) -> Callable[[], float]:
-    """Return a function giving the plain loop's CPU seconds per target-scan on the same flights."""
+    """Return a function that times the plain loop on the same flights, CPU seconds per
+    target-scan.
+    """
     step = max(1, len(scenes) // _SAMPLED_REPLICAS)
-    prepared = [yardstick.prepare(_fly_if_steered(one)) for one in (scenes[::step] or [scene])]
+    prepared = [
+        yardstick.prepare_plain_loop(_fly_if_steered(one)) for one in (scenes[::step] or [scene])
+    ]
 
     def seconds_per_unit() -> float:
         started = time.process_time()

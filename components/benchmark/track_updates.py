@@ -17,7 +17,7 @@ import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import dsa_des
-from components.estimation.batched import multiply_by_transpose, product
+from components.estimation.batched import matrix_product, multiply_by_transpose
 from components.estimation.frame import SensorPose, pose_in_frame
 from components.estimation.measurement import position_and_jacobian
 from components.tracking.filters import ExtendedKalman
@@ -54,7 +54,7 @@ def record_tracker_inputs(replicas: int, targets: int) -> Listening:
 
     Three sensors see every target at every look.
     """
-    scene = dsa_des.load_scene(_scene(targets))
+    scene = dsa_des.load_scene(_tracking_scene_tables(targets))
     simulation = make_lockstep_simulation(
         [replica_scene(scene, Replica(1 + i, {})) for i in range(replicas)]
     )
@@ -77,7 +77,7 @@ def prepare_tracker_updates(replicas: int, targets: int) -> Callable[[], object]
     return track
 
 
-def _scene(targets: int) -> dict[str, Any]:
+def _tracking_scene_tables(targets: int) -> dict[str, Any]:
     around = [2.0 * math.pi * k / targets for k in range(targets)]
     flights = [
         {
@@ -213,7 +213,7 @@ _FEW = 27
 def prepare_plain_updates(targets: int) -> tuple[int, Callable[[], object]]:
     """Return the updates per call of the plain tracking loop, and the function that runs it."""
     block = record_tracker_inputs(1, targets)
-    scans, poses = _recorded_scans(block)
+    scans, poses = _recorded_scans_and_poses(block)
     looks = plain_looks(scans, poses, block.context.ticks_per_s)
     first, rest = _start_tracks(scans, poses, block.p.start_speed_m_s), looks[1:]
     updates = sum(len(look.measured) for look in rest)
@@ -231,7 +231,7 @@ def prepare_stone_soup_updates(targets: int) -> tuple[int, Callable[[], object]]
     from components.stone_soup.objects import Poses, make_detections, to_datetime
 
     block = record_tracker_inputs(1, targets)
-    scans, believed = _recorded_scans(block)
+    scans, believed = _recorded_scans_and_poses(block)
     poses = Poses(believed)
     looks = []
     for k in range(min(len(scans), _FEW)):
@@ -282,7 +282,7 @@ def _stone_soup_tracker(intensity: float, speed_m_s: float) -> Any:
     )
 
 
-def _recorded_scans(block: Listening) -> tuple[Scans, SensorPose]:
+def _recorded_scans_and_poses(block: Listening) -> tuple[Scans, SensorPose]:
     scans = Scans.concatenate([looks_of_message(wake["fused"]) for wake in block.kept])
     origin = scans.pose[:3, :1]
     lat, lon, alt = (np.repeat(value, len(scans)) for value in origin)
@@ -316,7 +316,7 @@ def _start_tracks(
     spread = np.zeros((3, 3, len(which)))
     for i in range(3):
         spread[i, i] = scans.variance[i, which]
-    turned = multiply_by_transpose(product(slope, spread), slope)
+    turned = multiply_by_transpose(matrix_product(slope, spread), slope)
     states, covariances = [], []
     for k in which.tolist():
         states.append(np.concatenate([position[:, k], np.zeros(3)]))

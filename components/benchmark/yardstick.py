@@ -98,11 +98,11 @@ def ned_to_body_matrix(yaw_rad: float, pitch_rad: float, roll_rad: float) -> lis
     ]  # fmt: skip
 
 
-def aspect_cosines(
+def aspect_cosine_sine_body_z(
     north: float, east: float, up: float, range_m: float, attitude: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return cosine and sine of the angle between the line of sight and a target's nose, and the
-    size of its component along body z.
+    """Return cosine and sine of the angle between a target's nose and the line of sight, and the
+    size of that line's component along body z.
     """
     m = ned_to_body_matrix(*attitude)
     n, e, d = north / range_m, east / range_m, -up / range_m
@@ -160,7 +160,7 @@ class Prepared:
     calendar: dict[int, list[tuple[LoopSensor, int]]]
 
 
-def prepare(simulation: Simulation) -> Prepared:
+def prepare_plain_loop(simulation: Simulation) -> Prepared:
     """Return what the plain loop needs of a ready scene: flights, sensors, draws and scan times."""
     traffic: Any = simulation.components["traffic"]
     targets = [target.segments[0] for target in traffic.targets]
@@ -202,7 +202,7 @@ def _loop_sensors(simulation: Simulation) -> list[LoopSensor]:
         block: Any = simulation.components[name]
         clock = simulation.nodes[name].clock
         assert clock is not None
-        numbers, instants = clock.between(0, simulation.end_tick)
+        numbers, instants = clock.scans_between(0, simulation.end_tick)
         reach = block.stated_reach
         sensor = LoopSensor(
             name,
@@ -226,12 +226,12 @@ def _loop_sensors(simulation: Simulation) -> list[LoopSensor]:
             sensor.pixels = float(block.p.azimuth_pixels * block.p.elevation_pixels)
             sensor.weight = block.p.static_weight
             sensor.threshold = block.detector.threshold
-            sensor.areas = _target_areas(roster, block.areas, block.contrasts)
+            sensor.areas = _target_areas_and_contrasts(roster, block.areas, block.contrasts)
         sensors.append(sensor)
     return sensors
 
 
-def _target_areas(
+def _target_areas_and_contrasts(
     roster: Any, areas: str, contrast: str
 ) -> list[tuple[float, float, float, float, float]]:
     back = "back_m2" if areas == "ir" else "front_m2"
@@ -277,7 +277,7 @@ def run(scene: Prepared, every: int = 1) -> LoopResult:
                         continue
                 else:
                     front, back, side, plane, contrast = sensor.areas[target]
-                    nose, off_nose, floor = aspect_cosines(
+                    nose, off_nose, floor = aspect_cosine_sine_body_z(
                         north, east, up, range_m, (position[3], *angles[target])
                     )
                     share = 0.5 * nose + 0.5

@@ -16,7 +16,7 @@ from components.optical.camera import Camera
 from components.optical.silhouette import PLATE_ASPECT_RATIO
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Component
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 # When, where in body axes, how far, how large, how far above the threshold.
 _COLUMNS = 6
@@ -53,10 +53,11 @@ class CameraSights:
         ], axis=1)  # fmt: skip
         self._seen[block] = seen
 
-    def picture(
+    def picture_of_contact(
         self, contact: int, toward: tuple[float, float] | None, time_s: float, own: OwnNow
     ) -> dict[str, Any] | None:
-        """Return the newest picture of a contact, or None where no camera has seen it.
+        """Return the newest camera picture of a contact as fields for the page; None where no
+        camera has seen it.
 
         Of a tracker that knows no targets the picture nearest to its direction is taken, of bearing
         and elevation `toward`, rad.
@@ -103,7 +104,7 @@ class CameraSights:
         return {
             **({} if patch is None else {"patch": patch.tolist()}),
             "target": contact,
-            "sensor": printable(name),
+            "sensor": escape_unprintable(name),
             "infrared": camera.areas == "ir",
             "age": round(max(time_s - seen_s, 0.0), 2),
             "pixels": round(pixels, 1),
@@ -164,7 +165,7 @@ def silhouette(
     ends = np.array([[half, 0.0, 0.0], [-half, 0.0, 0.0]]) @ scale.T
     circle = np.stack([np.cos(_AROUND), np.sin(_AROUND)], axis=1)
     round_px = circle * radius / (range_m * np.array(pixel_rad))
-    fuselage = _hull(np.concatenate([ends[0] + round_px, ends[1] + round_px]))
+    fuselage = _convex_hull(np.concatenate([ends[0] + round_px, ends[1] + round_px]))
     span = math.sqrt(areas.horizontal_m2 * PLATE_ASPECT_RATIO)
     chord = areas.horizontal_m2 / span if span else 0.0
     corners = 0.5 * np.array([
@@ -215,20 +216,20 @@ def _body_to_ned(attitude_rad: FloatArray) -> FloatArray:
     return np.stack(body_to_ned(*np.eye(3), *attitude_rad))
 
 
-def _hull(points: FloatArray) -> FloatArray:
+def _convex_hull(points: FloatArray) -> FloatArray:
     """Return the convex hull of points in a plane, counter-clockwise (Andrew's monotone chain)."""
     ordered = sorted(map(tuple, points.tolist()))
-    return np.array([*_half_hull(ordered), *_half_hull(ordered[::-1])])
+    return np.array([*_half_convex_hull(ordered), *_half_convex_hull(ordered[::-1])])
 
 
-def _half_hull(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+def _half_convex_hull(points: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
     result: list[tuple[float, ...]] = []
     for point in points:
-        while len(result) > 1 and _signed_area(result[-2], result[-1], point) <= 0.0:
+        while len(result) > 1 and _twice_signed_area(result[-2], result[-1], point) <= 0.0:
             result.pop()
         result.append(point)
     return result[:-1]
 
 
-def _signed_area(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
+def _twice_signed_area(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> float:
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

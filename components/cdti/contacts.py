@@ -8,7 +8,7 @@ import numpy as np
 
 from components.display.picture_plane import offset_positions
 from components.estimation.frame import vectors_in_frame
-from components.geometry import body_to_ned, north_east_up, unit_vector_unchecked
+from components.geometry import body_to_ned, north_east_up_offsets_m, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
 from components.messages.fused import FusedDetections
 from components.messages.state_tracks import DELETED, StateTracks
@@ -67,7 +67,9 @@ class OwnFlight:
         self.now = OwnNow(lat_deg, lon_deg, alt_m, yaw, pitch, roll, speed, climb)
 
     def poses_at(self, tick: IntArray) -> FloatArray:
-        """Return the last own pose by each tick (n, 6), degrees, m, rad; else the first pose."""
+        """Return the last own pose by each tick, else the first, (n, 6): lat, lon (deg), alt (m),
+        yaw, pitch, roll (rad).
+        """
         index = np.searchsorted(self._tick, tick, side="right") - 1
         return self._pose[np.maximum(index, 0)]
 
@@ -81,7 +83,7 @@ def _displacement_from(own: FloatArray, position: FloatArray) -> FloatArray:
     known = np.isfinite(position).all(axis=1)
     there = position[known]
     here = (np.full(len(there), value) for value in own[:3].tolist())
-    north, east, _ = north_east_up(*here, *np.ascontiguousarray(there.T))
+    north, east, _ = north_east_up_offsets_m(*here, *np.ascontiguousarray(there.T))
     result[known] = np.column_stack([east, north, there[:, 2] - own[2]])
     return result
 
@@ -124,10 +126,11 @@ class Contacts:
         return result
 
 
-def contacts_of_lines(
+def contacts_after_lines(
     message: Tracks | FusedDetections, own: OwnFlight, ticks_per_s: int, before: Contacts | None
 ) -> Contacts:
-    """Return the contacts after one more row of measured lines of sight, given those before.
+    """Return contacts after newly measured lines of sight, given those before; a missing range is
+    held for a while.
 
     Where only a direction was measured, the last range counts for a while yet. Tracks hold what was
     measured; fused lines are of one instant, and contacts that are not among them stay.
@@ -135,7 +138,9 @@ def contacts_of_lines(
     seen_s = message.measured_tick / ticks_per_s
     range_m, range_s = message.range_m, np.where(np.isfinite(message.range_m), seen_s, np.nan)
     if before is not None:
-        range_m, range_s = _hold_ranges(message.target, seen_s, range_m, range_s, before)
+        range_m, range_s = _fill_missing_ranges_and_times(
+            message.target, seen_s, range_m, range_s, before
+        )
     pose = own.poses_at(message.measured_tick)
     body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
@@ -151,7 +156,7 @@ def contacts_of_lines(
     return Contacts(*(np.concatenate([new, old[stays]]) for new, old in pairs))
 
 
-def _hold_ranges(
+def _fill_missing_ranges_and_times(
     number: IntArray, seen_s: FloatArray, range_m: FloatArray, range_s: FloatArray, before: Contacts
 ) -> tuple[FloatArray, FloatArray]:
     """Return ranges and the times of their measurement, where missing the contact's previous range,

@@ -22,7 +22,7 @@ from components.operator.human import Desk, PendingDecision, Taken
 from dsa_des.running.pacing import Pacer
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.terminal import say
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 if TYPE_CHECKING:
     from components.cdti.server import DisplayServer, Page
@@ -63,7 +63,7 @@ class LivePacer(Pacer):
         return WINDOW_S * self.factor
 
     def wake(self) -> None:
-        """Make the waiting run check at once whether it may go on; callable from any thread. Any
+        """Make the waiting run check at once whether it may go on; any thread may call it. Any
         thread may call it.
         """
         self._changed.set()
@@ -155,7 +155,7 @@ class SessionControl:
         """Return whether the run must wait; print a new address if the operator's page is gone."""
         if self._gone_at is not None and time.monotonic() - self._gone_at > GONE_S:
             self._gone_at = None
-            address = self._server.page_url(self._admission.renew_token())
+            address = self._server.page_url(self._admission.unused_operator_token())
             say(f"the operator's page is gone; to decide again: {address}")
         if self._waits and not self._began:
             return True
@@ -202,7 +202,7 @@ class SessionControl:
 
     # -- the thread of the server ------------------------------------------------------------------
 
-    def on_operators(self, count: int) -> None:
+    def store_operator_count(self, count: int) -> None:
         """Store how many connected pages may decide."""
         if self._operators and not count:
             self._gone_at = time.monotonic()
@@ -218,7 +218,7 @@ class SessionControl:
         scope = self.scope
         duration = self._scene.duration_s
         return {
-            "title": printable(self._scene.title),
+            "title": escape_unprintable(self._scene.title),
             "duration": None if duration is None else float(duration),
             "factor": self._factor,
             "units": self._units,
@@ -230,8 +230,8 @@ class SessionControl:
         }
 
     def frame(self, chosen: int) -> dict[str, Any] | None:
-        """Return the newest picture of the display, with the camera's picture of the contact chosen
-        on a page; None without a display.
+        """Return a page's newest content as a message, with the camera's picture of contact
+        `chosen` (-1: the most urgent); None without a display.
         """
         scope = self.scope
         if scope is None:
@@ -239,7 +239,7 @@ class SessionControl:
         began = time.thread_time()
         time_s, lag_s, received = self._now
         if self._made is None or self._made[0] != time_s:
-            self._made = time_s, scope.picture(time_s, received)
+            self._made = time_s, scope.page_content(time_s, received)
         picture = self._made[1]
         content = {
             "type": "frame",
@@ -290,7 +290,9 @@ class SessionControl:
             await page.send({"type": "refused", "id": message.id, "why": why})
 
     def _submit(self, message: Judged | Turned | Climbed, name: str) -> bool:
-        """Pass on an operator's decision; return whether it was queued; pages hear if accepted."""
+        """Queue an operator's decision and return whether that worked; if accepted later, pages are
+        told.
+        """
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
         decision = OperatorDecision(

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from components.well_clear.detection import detection_span
+from components.well_clear.detection import violation_or_advisory_span
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Volume
 from dsa_des.arrays.types import FloatArray
@@ -44,7 +44,7 @@ def predicted_loss_area(
     turned = [*relative[:3], relative[3] + east, relative[4] + north, relative[5]]
     parts = [part.reshape(-1) for part in np.broadcast_arrays(*turned)]
     own_up = np.full(len(parts[0]), own_alt_m), np.full(len(parts[0]), own_mps[2])
-    span = detection_span(volume, parts, own_up, None, 0.0, lookahead_s)
+    span = violation_or_advisory_span(volume, parts, own_up, None, 0.0, lookahead_s)
     lost = np.flatnonzero(span.begin_s < span.end_s)
     direction = np.repeat(DIRECTIONS_RAD, relative.shape[1])[lost]
     return Reached(direction, speed_mps * span.begin_s[lost], speed_mps * span.end_s[lost])

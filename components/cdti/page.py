@@ -22,7 +22,7 @@ _MOST_DEG, _MOST_M = 180.0, 3000.0
 
 
 @cache
-def page_and_digest() -> tuple[str, str]:
+def page_html_and_script_digest() -> tuple[str, str]:
     """Return the HTML of the display page and the SHA-256 digest of its script.
 
     All that is said of a run comes over the socket, and is put on screen as text.
@@ -37,7 +37,7 @@ def page_headers(socket_address: str) -> dict[str, str]:
 
     The browser may run the one program inside, talk to this server's socket, and nothing else.
     """
-    _, digest = page_and_digest()
+    _, digest = page_html_and_script_digest()
     policy = (
         f"default-src 'none'; script-src 'sha256-{digest}'; style-src 'unsafe-inline'; "
         f"connect-src {socket_address}; base-uri 'none'; form-action 'none'; "
@@ -69,12 +69,14 @@ class Admission:
         self._watching = [self.token]
         self._key = ""
 
-    def is_token(self, token: str) -> bool:
+    def is_issued_token(self, token: str) -> bool:
         """Return whether a token was issued in this run, even if it only lets watch by now."""
         return any(_is_equal_in_constant_time(token, known) for known in self._watching)
 
     def role_and_key(self, token: str, key: str) -> tuple[str, str]:
-        """Return operator or watcher for this token and key, and the operator's key or empty."""
+        """Return the role (operator or watcher) that token and key give, and the operator's key,
+        empty for a watcher.
+        """
         if self._key and _is_equal_in_constant_time(key, self._key):
             return OPERATOR, self._key
         if self._fresh and _is_equal_in_constant_time(token, self.token):
@@ -83,7 +85,7 @@ class Admission:
             return OPERATOR, self._key
         return WATCHER, ""
 
-    def renew_token(self) -> str:
+    def unused_operator_token(self) -> str:
         """Return a token to become operator, new if the last was used; earlier keys stay valid."""
         if not self._fresh:
             self.token, self._fresh = _new_token(), True

@@ -18,7 +18,7 @@ from components.cdti.contacts import (
     Contacts,
     OwnFlight,
     OwnNow,
-    contacts_of_lines,
+    contacts_after_lines,
     contacts_of_states,
 )
 from components.cdti.loss_area import predicted_loss_area
@@ -41,7 +41,7 @@ from dsa_des.block.component import Component
 from dsa_des.block.message import Message
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.running.simulation import Simulation
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 #: A contact that was not seen for so long is no longer shown, s.
 FORGOTTEN_S = 10.0
@@ -161,11 +161,11 @@ class Scope:
         elif isinstance(message, Tracks | FusedDetections):
             for row in range(count):  # a range counts on in the rows after it
                 one = message.take(slice(row, row + 1))
-                self._contacts = contacts_of_lines(one, self._own, self._per_s, self._contacts)
+                self._contacts = contacts_after_lines(one, self._own, self._per_s, self._contacts)
 
     def _store_names(self, names: tuple[str, ...]) -> None:
         if names is not self._names:
-            self._names, self.names = names, [printable(name) for name in names]
+            self._names, self.names = names, [escape_unprintable(name) for name in names]
 
     def _store_alerts(self, message: AlertLevels) -> None:
         contacts = message.contact_numbers()
@@ -223,7 +223,7 @@ class Scope:
             return round((math.degrees(own.heading_rad) + value) % 360.0, 1)
         return round(own.alt_m + value, 1)
 
-    def picture(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
+    def page_content(self, time_s: float, received: Received | None = None) -> dict[str, Any]:
         """Return what the page shows at an instant, for JSON (m, deg, s): own state, contacts,
         alerts, loss area, bands and failed sensors.
         """
@@ -289,7 +289,7 @@ class Scope:
             if not first:
                 return None
             chosen = first[0]
-        return self._sights.picture(chosen, self._direction_of(chosen), time_s, own)
+        return self._sights.picture_of_contact(chosen, self._direction_of(chosen), time_s, own)
 
     def _direction_of(self, contact: int) -> tuple[float, float] | None:
         """Return a contact's last bearing from north and elevation, rad; None if it is unknown."""
@@ -306,7 +306,7 @@ class Scope:
         on = np.flatnonzero(alerts.level > 0)
         if self._rules is None or len(on) == 0 or not np.all(np.isfinite(alerts.own_mps)):
             return []
-        level = self._rules[0].corrective_level(self._rules[1])
+        level = self._rules[0].first_corrective_level(self._rules[1])
         if level is None:
             return []
         relative = alerts.relative[:, on]

@@ -8,7 +8,7 @@ from components.messages.detections import Detections, SensorOffer
 from components.sensor.palette import IR
 from dsa_des.block.component import Component
 from dsa_des.running.simulation import Simulation
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 #: A sensor from which nothing has come for so many of its scans, and so long, is said to be out.
 _SILENT_SCANS, _SILENT_S = 2.5, 1.0
@@ -24,7 +24,7 @@ def silent_sensors(
 ) -> list[str]:
     """Return names of sensors silent for longer than they may be, by when each was last heard."""
     return [
-        printable(name)
+        escape_unprintable(name)
         for name, most_s in longest_s.items()
         if time_s - heard_s.get(name, 0.0) > most_s
     ]
@@ -55,7 +55,7 @@ def _describe(name: str, component: Component) -> dict[str, Any]:
     offer: SensorOffer = component.offer("detections")
     kind = "radar" if offer.measures_range else "ir" if component.mark is IR else "eo"
     reach = offer.reach
-    result: dict[str, Any] = {"name": printable(name), "kind": kind}
+    result: dict[str, Any] = {"name": escape_unprintable(name), "kind": kind}
     if reach is None or not reach.enabled:
         return {**result, "range": None, "azimuth": None}
     # Bounds are in the sensor's axes.

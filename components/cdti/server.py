@@ -26,8 +26,8 @@ from components.cdti.page import (
     Admission,
     Drawn,
     PageMessage,
-    page_and_digest,
     page_headers,
+    page_html_and_script_digest,
     read_message,
 )
 from dsa_des.errors import UsageError
@@ -64,7 +64,7 @@ class Page:
         await self._free.wait()
 
     async def send_frame(self, content: dict[str, Any]) -> None:
-        """Send a picture."""
+        """Send a message with the newest content of the display."""
         self._sent += 1
         if self._sent - self._drawn >= _AHEAD:
             self._free.clear()
@@ -83,12 +83,14 @@ class PageControl(Protocol):
         """Return the first message to a new page."""
 
     def frame(self, chosen: int) -> dict[str, Any] | None:
-        """Return the newest picture, or None before the first."""
+        """Return a page's newest content as a message, for the contact chosen on it; None before
+        the first.
+        """
 
     async def on_message(self, page: Page, message: PageMessage) -> None:
         """Process a message from a page."""
 
-    def on_operators(self, count: int) -> None:
+    def store_operator_count(self, count: int) -> None:
         """Store how many connected pages may decide."""
 
 
@@ -112,17 +114,17 @@ class DisplayServer:
         """Start the thread that serves the page; UsageError if the address cannot be used."""
         self._thread.start()
         if not self._up.wait(_START_S) or self._failed:
-            raise UsageError(f"cannot serve at {self.authority}: {self._failed or 'no answer'}")
+            raise UsageError(f"cannot serve at {self.host_and_port}: {self._failed or 'no answer'}")
 
     @property
-    def authority(self) -> str:
-        """Host and port, as they stand in the address."""
+    def host_and_port(self) -> str:
+        """Host and port as text, joined as in the page's address."""
         host = f"[{self._host}]" if ":" in self._host else self._host
         return f"{host}:{self._port}"
 
     def page_url(self, token: str) -> str:
         """Return the URL of the page with this token."""
-        return f"http://{self.authority}/?token={token}"
+        return f"http://{self.host_and_port}/?token={token}"
 
     def announce_picture(self) -> None:
         """Wake every page, so that each sends the new picture when its client is ready."""
@@ -194,24 +196,24 @@ class DisplayServer:
         """Return the response to an HTTP request: page or error; None lets the socket be opened."""
         parts = urlsplit(request.path)
         hosts = request.headers.get_all("Host")
-        if hosts != [self.authority]:  # another name for this address: a page of somewhere else
+        if hosts != [self.host_and_port]:  # another name for this address: a page of somewhere else
             return connection.respond(403, "not this host\n")
-        if not self._admission.is_token(_token_of_request(request)):
+        if not self._admission.is_issued_token(_token_of_request(request)):
             return connection.respond(
                 403, "the address lacks its token, or it is not of this run\n"
             )
         if parts.path == "/":
-            text, _ = page_and_digest()
+            text, _ = page_html_and_script_digest()
             body = text.encode("utf-8")
             sent = Headers(
-                {**page_headers(f"ws://{self.authority}"), "Content-Length": str(len(body))}
+                {**page_headers(f"ws://{self.host_and_port}"), "Content-Length": str(len(body))}
             )
             sent["Connection"] = "close"
             return Response(200, "OK", sent, body)
         if parts.path != SOCKET:
             return connection.respond(404, "there is nothing here\n")
         # Only our own page may open the socket, wherever it is opened from.
-        if request.headers.get_all("Origin") != [f"http://{self.authority}"]:
+        if request.headers.get_all("Origin") != [f"http://{self.host_and_port}"]:
             return connection.respond(403, "not this origin\n")
         if len(self.pages) >= MOST_PAGES:
             return connection.respond(503, "too many browsers\n")
@@ -250,7 +252,7 @@ class DisplayServer:
             self._report_operator_count()
 
     def _report_operator_count(self) -> None:
-        self._control.on_operators(sum(page.role == OPERATOR for page in self.pages))
+        self._control.store_operator_count(sum(page.role == OPERATOR for page in self.pages))
 
     async def _handle_text(self, page: Page, text: str | bytes) -> None:
         try:
@@ -300,7 +302,7 @@ class ConnectionLimit:
         """Return a connection for `websockets.asyncio.server.serve`, dropped beyond the limit."""
         return _Limited(self, *given, **options)
 
-    def count_opened(self) -> bool:
+    def count_if_room(self) -> bool:
         """Count a connection that opens; return False where there is no room for it."""
         if self._open >= self._most:
             self._warn_once(f"more than {self._most} connections")
@@ -339,7 +341,7 @@ class _Limited(ServerConnection):
 
     def connection_made(self, transport: Any) -> None:
         """Accept a connection, or drop it where too many are open."""
-        self._taken = self._limit.count_opened()
+        self._taken = self._limit.count_if_room()
         if self._taken:
             super().connection_made(transport)
         else:

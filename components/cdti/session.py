@@ -24,7 +24,7 @@ from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import Scene
 from dsa_des.terminal.interruption import Terminated
 from dsa_des.terminal.terminal import say
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 _LOOPBACK = ("127.0.0.1", "::1", "localhost")
 _EVERYWHERE = ("0.0.0.0", "::", "")
@@ -61,7 +61,7 @@ def run_session(
     # By its whole path, so that the run folder's scene finds its files from wherever it is run.
     path = Path(os.path.abspath(find_input_file(scene, "scene")))
     loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
-    console = _console_block(loaded)
+    console = _console_block_name(loaded)
     target = OutputFolder.from_option(out, Path("runs"), loaded.path.stem)
     target.check()
     replay = _scene_for_replay(loaded, console, target.path)
@@ -109,13 +109,14 @@ def run_session(
         desk.close()
         server.close({"type": "end", "why": ended})
     say(
-        f"run: {printable(str(summary['out']))}: {control.decisions_sentence()}; {pacer.sentence()}"
+        f"run: {escape_unprintable(str(summary['out']))}: {control.decisions_sentence()}; "
+        f"{pacer.sentence()}"
     )
     if received:
         raise KeyboardInterrupt if received[0] == signal.SIGINT else Terminated(received[0])
 
 
-def _console_block(scene: Scene) -> str | None:
+def _console_block_name(scene: Scene) -> str | None:
     """Return the block at which a person decides (name); None for a scene that is only watched."""
     result = [name for name, cls in scene.classes.items() if issubclass(cls, Human)]
     if len(result) > 1:

@@ -36,7 +36,7 @@ class Alerted:
         if "manoeuvres" in names:
             result.manoeuvres = _manoeuvre_times_by_platform(run)
         if "alerts" in names and run.tables["alerts"].num_rows:
-            result.stretches = _alert_stretches_by_target(run)
+            result.stretches = _alert_periods_by_target(run)
         return result
 
     @property
@@ -55,7 +55,7 @@ class Alerted:
 
         handles = []
         for level in self.levels:
-            colour, width = alert_style(level)
+            colour, width = alert_colour_and_width(level)
             line = Line2D([], [], color=colour, linewidth=width, label=f"alert {level}")
             line.set_solid_capstyle("butt")
             handles.append(line)
@@ -64,7 +64,7 @@ class Alerted:
         return handles
 
 
-def alert_style(level: int) -> tuple[str, float]:
+def alert_colour_and_width(level: int) -> tuple[str, float]:
     """Return colour and line width in which an alert of this level is drawn."""
     return _LEVELS[min(level, len(_LEVELS)) - 1]
 
@@ -78,7 +78,7 @@ def _manoeuvre_times_by_platform(run: RecordedTables) -> dict[str, FloatArray]:
     return {name: np.unique(time_s[on == name]) for name in sorted(set(on.tolist()))}
 
 
-def _alert_stretches_by_target(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
+def _alert_periods_by_target(run: RecordedTables) -> dict[str, list[tuple[int, float, float]]]:
     """Return each target's alerts (level, begin, end in s), lasting to the alerter's next scan."""
     level = run.numbers("alerts", "level").astype(np.int64)
     time_s = run.numbers("alerts", "time_s")
@@ -123,7 +123,7 @@ def draw_alerted_lines(
             points = np.column_stack((np.interp(at, time_s, x), np.interp(at, time_s, y)))
             if not np.isfinite(points).all():
                 points = points[np.isfinite(points).all(axis=1)]
-            colour, width = alert_style(level)
+            colour, width = alert_colour_and_width(level)
             segments.append(points)
             colours.append(colour)
             widths.append(width)

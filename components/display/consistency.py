@@ -19,8 +19,8 @@ _STRETCHES = 40
 
 
 def nees_of_nearest_target(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return the normalised error squared of each row of a track against its nearest target, and
-    whether one is within `NEAR_M`.
+    """Return the normalised error squared of each row of a track against its nearest target, NaN
+    where none is within `NEAR_M`, and whether one is.
 
     States (targets, 6, rows) are those of the targets at the same times.
     """
@@ -41,7 +41,8 @@ def nees_of_nearest_target(one: dict[str, Any], states: FloatArray) -> tuple[Flo
 
 
 def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
-    """Draw the tracks' normalised squared errors and innovations over time, with 95 % bounds.
+    """Draw the tracks' normalised squared errors and innovations over time, with 95 % bounds; None
+    if no track is near a target.
 
     A row of a track that has a target counts; the bounds hold 95 % of consistent ones. None is
     drawn where no track is near a target.
@@ -64,14 +65,14 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
     }
     low, high = chi_square_bounds(6)
     said = {
-        block: f"{every.mean():.3g}, {_percent((every >= low) & (every <= high))} inside"
+        block: f"{every.mean():.3g}, {_percentage_text((every >= low) & (every <= high))} inside"
         for block, every in of_block.items()
     }
     with draw_to_png(9.0, 6.4, path) as figure:
         errors, innovations = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         names = {block: f"{figure_text(block, 16)}: {words}" for block, words in said.items()}
         if len(shown) > MOST_SPREADS:
-            _draw_shares(errors, drawn, shown, names)
+            _draw_median_and_95_percent(errors, drawn, shown, names)
         else:
             labelled: set[str] = set()
             for track, time_s, values in shown:
@@ -100,7 +101,7 @@ def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
     return path
 
 
-def _draw_shares(
+def _draw_median_and_95_percent(
     axes: Any,
     drawn: DrawnTracks,
     shown: list[tuple[Any, FloatArray, FloatArray]],
@@ -167,7 +168,7 @@ def _draw_innovations_of_tracker(
                       alpha=0.15 if tracker else 0.3, linewidth=0, zorder=0,
                       label=None if tracker else "95 %")  # fmt: skip
     inside = (total / many >= low) & (total / many <= high)
-    said = f"{nis.sum() / freedom.sum():.3g}, {_percent(inside)}"
+    said = f"{nis.sum() / freedom.sum():.3g}, {_percentage_text(inside)}"
     axes.plot(middle, total / many, color=colour, marker=".", linewidth=0.9,
               label=f"{tracker}: {said}" if tracker else "mean per quantity")  # fmt: skip
     axes.set_title(
@@ -176,5 +177,5 @@ def _draw_innovations_of_tracker(
     )  # fmt: skip
 
 
-def _percent(inside: BoolArray) -> str:
+def _percentage_text(inside: BoolArray) -> str:
     return f"{100.0 * np.mean(inside):.0f} %"

@@ -66,7 +66,7 @@ class Flights:
         self.duration_s = duration_s
         count = int(np.clip(MOST_POINTS // (len(self._targets) + 1), 60, 600))
         times = _times_present(source.own, duration_s, count)
-        own = source.own_at(times)
+        own = source.own_states_at(times)
         start = int(np.argmax(own.present))
         #: Latitude and longitude in degrees and altitude in metres of the map's origin.
         self.origin = float(own.lat_deg[start]), float(own.lon_deg[start]), float(own.alt_m[start])
@@ -175,7 +175,7 @@ Positions = dict[str, list[tuple[Track, FloatArray, FloatArray, FloatArray]]]
 
 
 def detection_positions(flights: Flights, detected: Detected) -> Positions:
-    """Return for each sensor, target by target, its flight and time, true east and north (km) of
+    """Return by sensor, for each target, its flight and the times (s), true east and north (km) of
     the detections to mark.
     """
     tracks = flights.tracks
@@ -202,7 +202,9 @@ def detection_positions(flights: Flights, detected: Detected) -> Positions:
 
 
 def plot_extent_points(flights: Flights, result: Positions) -> FloatArray:
-    """Return the points the plan must show: start, detections and ownship then; km, (points, 2)."""
+    """Return points that the plan must show: the start, detections, and the ownship at their times;
+    km, (points, 2).
+    """
     points = [np.zeros((1, 2))]
     own = flights.own
     for paths in result.values():

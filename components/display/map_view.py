@@ -34,8 +34,8 @@ class Outline:
 def outline_of(
     yaw_rad: float, reach: Any, axes: Any, start_km: tuple[float, float] = (0.0, 0.0)
 ) -> Outline:
-    """Return a sensor's reach seen from above, of a level ownship at `start_km` (east, north),
-    heading `yaw_rad`.
+    """Return the outline, seen from above, of a sensor's field of view at elevation 0, for a level
+    ownship at `start_km` (east, north) with heading `yaw_rad`.
 
     It is drawn as the plane of elevation 0 of the sensor's axes; a tilted sensor foreshortens it.
     """
@@ -81,7 +81,7 @@ def draw_outline(
         )  # fmt: skip
 
 
-def reach_text(reach: Any, axes: Any) -> str:
+def field_of_view_text(reach: Any, axes: Any) -> str:
     """Return a sensor's field of view and range limit in words, with a boresight off the nose."""
     if not reach.enabled:
         return "switched off"

@@ -40,7 +40,7 @@ def outcome_observers(simulation: Simulation) -> list[Observer]:
     if names := blocks_sending(simulation, StateTracks):
         result.append(TrackSummary(names, _true_targets_factory(simulation)))
     if names := blocks_sending(simulation, AlertLevels):
-        result.append(AlertSummary(_alert_sources(simulation, names)))
+        result.append(AlertSummary(_target_sources_by_alerter(simulation, names)))
     if names := blocks_sending(simulation, Manoeuvres):
         result.append(ManoeuvreSummary(names))
     return result
@@ -265,9 +265,13 @@ class _Tracker:
             result["false"] = len(self._judged - self._near) if self._judged else None
             mean = self._squares_m2 / self._count if self._count else None
             result["position_error_m"] = None if mean is None else mean**0.5
-        result["first_confirmed"] = None if self._first is None else _first_result(self._first)
+        result["first_confirmed"] = (
+            None if self._first is None else _time_and_range_fields(self._first)
+        )
         if self._at is not None:
-            result["targets"] = {n: _first_result(self._firsts[n]) for n in sorted(self._firsts)}
+            result["targets"] = {
+                n: _time_and_range_fields(self._firsts[n]) for n in sorted(self._firsts)
+            }
         return result
 
 
@@ -286,7 +290,7 @@ def _earliest_time_and_range(
     return here if first is None else min(first, here)
 
 
-def _first_result(first: tuple[float, float]) -> dict[str, float | None]:
+def _time_and_range_fields(first: tuple[float, float]) -> dict[str, float | None]:
     return {"time_s": first[0], "range_m": first[1] if math.isfinite(first[1]) else None}
 
 
@@ -295,10 +299,12 @@ def _true_targets_factory(simulation: Simulation) -> Any:
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     if not sources or not all(source.says_truth for source in sources):
         return None
-    return lambda tracker, origin: TargetsInFrame(flights_seen_from(simulation, tracker), origin)
+    return lambda tracker, origin: TargetsInFrame(
+        flights_of_other_aircraft(simulation, tracker), origin
+    )
 
 
-def flights_seen_from(simulation: Simulation, block: str) -> list[Any]:
+def flights_of_other_aircraft(simulation: Simulation, block: str) -> list[Any]:
     """Return the true flights of all aircraft other than the platform that carries a block."""
     sources = [b for b in simulation.components.values() if isinstance(b, TrafficSource)]
     platform = simulation.components[block].context.platform
@@ -317,7 +323,9 @@ def distances_to_targets(columns: Columns, rows: Any, ned_m: FloatArray) -> Floa
     return np.asarray(np.sqrt(((ned_m - estimate) ** 2).sum(axis=1)))
 
 
-def _alert_sources(simulation: Simulation, names: Iterable[str]) -> dict[str, list[str]]:
+def _target_sources_by_alerter(
+    simulation: Simulation, names: Iterable[str]
+) -> dict[str, list[str]]:
     """Return each alerter's blocks that tell it of targets, or `TRUTH` if only traffic feeds it."""
     traffic = set(blocks_sending(simulation, TrafficStates))
     result = {}

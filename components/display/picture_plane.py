@@ -71,7 +71,8 @@ def offset_positions(ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray
 
 
 def bearings_and_end_points(line: FloatArray, pose: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return bearings of lines of sight, rad clockwise from north, and end positions (3, n).
+    """Return bearings of lines of sight, rad clockwise from north, and their ends: latitude,
+    longitude (deg), height (m), (3, n).
 
     Lines (3, n) are those of `LINE`, poses (6, n) those of `POSE`, in degrees, metres and radians.
     What is not known is NaN.
@@ -93,8 +94,9 @@ def bearings_and_end_points(line: FloatArray, pose: FloatArray) -> tuple[FloatAr
     return np.arctan2(east, north), offset_positions(ned(ranged, range_m[ranged]), pose[:3])
 
 
-def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
-    """Return the indices and positions of rows of ``state_tracks`` with a range.
+def estimated_rows_and_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
+    """Return the indices of rows of ``state_tracks`` with a position, and latitude, longitude
+    (deg), height (m) of each, (3, n).
 
     Latitude, longitude (deg) and height above the ellipsoid (m), (3, n), at ``state_s``.
     """
@@ -105,10 +107,11 @@ def estimated_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
     return rows, offset_positions(ned_m[:, rows], run.stack_columns("state_tracks", ORIGIN, rows))
 
 
-def held_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
-    """Return a row index of ``tracks`` for each measurement with a held range, and its position.
+def held_range_rows_and_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
+    """Return, once per measurement, the index of a row of ``tracks`` with a range, and latitude,
+    longitude (deg), height (m) there, (3, n).
 
-    Places are as in `estimated_positions`, at ``measured_s``.
+    Places are as in `estimated_rows_and_positions`, at ``measured_s``.
     """
     nothing = np.empty(0, dtype=np.int64), np.empty((3, 0))
     if "tracks" not in run.tables:

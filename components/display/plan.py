@@ -13,8 +13,8 @@ from components.display.map_view import (
     MAP_WIDTH_IN,
     MapView,
     draw_outline,
+    field_of_view_text,
     outline_of,
-    reach_text,
 )
 from components.display.outcomes import platform_by_block
 from components.display.recorded_rows import Detected
@@ -26,7 +26,7 @@ from components.display.symbols import (
     TARGET,
     Labels,
     add_grid,
-    alternate_marks,
+    alternating_mark_indices,
     draw_lines,
     draw_marks,
     label_line_ends,
@@ -122,9 +122,9 @@ def draw_plan(
         for name, when_s in alerted.manoeuvres.items():
             if flown := tracks.get(name or flights.own_name):  # of very many some have no track
                 draw_manoeuvres(heights, when_s, np.interp(when_s, flown.time_s, flown.alt_m))
-        texts = {name: reach_text(reach, mounted[name]) for name, reach in reaches.items()}
+        texts = {name: field_of_view_text(reach, mounted[name]) for name, reach in reaches.items()}
         dense = len(flights.targets) >= DENSE
-        handles = _legend(texts, detected, drawn, summary, carrying, dense)
+        handles = _legend_entries(texts, detected, drawn, summary, carrying, dense)
         handles[4:4] = alerted.legend_entries()
         figure.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(right + 0.005, bottom + high),
@@ -185,7 +185,9 @@ def _draw_detection_marks(
     points = []
     for track, time_s, east, north in paths:
         along_px = np.interp(time_s, track.time_s, track.along_km) / view.km_per_px
-        points.append(np.column_stack((east, north))[alternate_marks(along_px, styles, name)])
+        points.append(
+            np.column_stack((east, north))[alternating_mark_indices(along_px, styles, name)]
+        )
     return draw_marks(axes, styles[name], np.concatenate(points))
 
 
@@ -212,7 +214,7 @@ def _draw_altitudes(
     for name, style in styles.items():
         points = []
         for track, time_s, _, _ in marks.get(name, []):
-            kept = time_s[alternate_marks(time_s * px_per_s, styles, name)]
+            kept = time_s[alternating_mark_indices(time_s * px_per_s, styles, name)]
             points.append(np.column_stack((kept, np.interp(kept, track.time_s, track.alt_m))))
         if points:
             draw_marks(axes, style, np.concatenate(points))
@@ -276,7 +278,7 @@ def _closest_approaches(flights: Flights) -> list[tuple[float, str, float, float
     return sorted(met)[:MOST_NAMED]
 
 
-def _legend(
+def _legend_entries(
     reaches: dict[str, str], detected: Detected, drawn: dict[str, int], summary: dict[str, Any],
     carrying: Mapping[str, str], dense: bool,
 ) -> list[Any]:  # fmt: skip

@@ -77,7 +77,9 @@ class RecordedTables:
 
     @cached_property
     def own_name(self) -> str:
-        """Name by which other platforms detect the ownship, one of no target in recorded truth."""
+        """Name by which other platforms detect the ownship: the first recorded name that is no true
+        target's.
+        """
         if not self.platform_by_block:
             return OWNSHIP
         seen = {name: None for table in ("detections", "tracks", "alerts")
@@ -136,7 +138,9 @@ class RecordedTables:
         return result
 
     def true_poses(self, time_s: FloatArray, platform: str | None = None) -> FloatArray | None:
-        """Return a platform's true poses (6, n), by default own; None if one is missing."""
+        """Return true poses at these recorded times, (6, n): lat, lon (deg), alt (m), yaw, pitch,
+        roll (rad), of the ownship or a named platform; None if one is missing.
+        """
         own = self.true_flights().get(platform or self.own_name)
         if own is None:
             return None
@@ -227,7 +231,7 @@ def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
     return read_tables(os.fspath(run))
 
 
-def scene_hint(name: str) -> str:
+def hint_for_shipped_scene(name: str) -> str:
     """Return the end of an error message that helps a user who named a shipped scene instead of a
     run; empty otherwise.
     """
@@ -239,7 +243,7 @@ def read_tables(run: str) -> RecordedTables:
     """Return a run folder's tables; UsageError if it is none or a table cannot be read."""
     folder = Path(run)
     if not folder.is_dir():
-        raise UsageError(f"{run}: there is no such folder{scene_hint(run)}")
+        raise UsageError(f"{run}: there is no such folder{hint_for_shipped_scene(run)}")
     paths = sorted(folder.glob("*.parquet"))
     if not (folder / "run.json").is_file() or not paths:
         raise UsageError(f"{run}: holds no run: run.json or its tables are missing")

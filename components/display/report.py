@@ -20,7 +20,9 @@ from dsa_des.running.simulation import Simulation
 
 
 def changed_detections_ratio(changes: Mapping[str, Any]) -> float:
-    """Return the number of detections gained and lost between runs, over the reference's number."""
+    """Return detections gained plus lost between two runs, divided by those of the reference
+    run.
+    """
     changed = changes.get("detections_gained", 0) + changes.get("detections_lost", 0)
     return float(changed / max(changes.get("detections_reference", 0), 1))
 
@@ -105,7 +107,8 @@ def sensor_names(simulation: Simulation) -> list[str]:
 
 
 def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return two runs' differences in detections and fusion, from tables, by the figure's name.
+    """Return the differences in detections and fusion between two runs' tables: numbers and lists,
+    by name.
 
     Tables are ``pyarrow.Table`` by name: ``detections`` and ``fused``. ``detections_gained`` and
     ``detections_lost`` count (sensor, target, instant) that only one of the runs has, of
@@ -125,7 +128,7 @@ def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict
         change = (others[name][1] - firsts[name][1], others[name][0] - firsts[name][0])
         if moved[0] is None or abs(change[0]) > abs(moved[0]):
             moved, of = change, name
-    share, changed = _fused_share(reference), _fused_share(other)
+    share, changed = _multi_sensor_fused_share(reference), _multi_sensor_fused_share(other)
     return {
         "first_detection_of": of,
         "first_detection_range_change_m": moved[0],
@@ -164,7 +167,7 @@ def _first_by_sensor_and_target(
     return result
 
 
-def _fused_share(tables: Mapping[str, Any]) -> float | None:
+def _multi_sensor_fused_share(tables: Mapping[str, Any]) -> float | None:
     table = tables.get("fused")
     if table is None or table.num_rows == 0:
         return None

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from components.messages.detections import Detections
-from components.metrics.rows import END, START, is_in_scan
+from components.metrics.rows import END, START, is_at_boundary_scan
 from dsa_des.arrays.types import IntArray
 
 #: Columns of recorded rows; of text `dsa_des.block.message.Text`.
@@ -137,18 +137,20 @@ class _Sensor:
                 for name, n in self.skipped.items()
                 if n or name != _HIDDEN
             },
-            "first_detection": self._sighting_with_censoring(self.first, 0),
-            "last_detection": self._sighting_with_censoring(self.last, 1),
+            "first_detection": self._sighting_with_cut_off_end(self.first, 0),
+            "last_detection": self._sighting_with_cut_off_end(self.last, 1),
         }
 
-    def _sighting_with_censoring(self, seen: "_Sighting | None", end: int) -> dict[str, Any] | None:
-        """Return a detection's fields, with ``at`` if it lies in the sensor's first or last scan,
-        so that the run cuts it off.
+    def _sighting_with_cut_off_end(
+        self, seen: "_Sighting | None", end: int
+    ) -> dict[str, Any] | None:
+        """Return a detection's fields, plus ``at`` (start or end) if it lies in the sensor's first
+        or last scan, where the run cuts it off.
         """
         if seen is None:
             return None
         result = seen.result()
-        if self.span is not None and is_in_scan(seen.tick, self.span[end]):
+        if self.span is not None and is_at_boundary_scan(seen.tick, self.span[end]):
             result["at"] = (START, END)[end]
         return result
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from components.sensor.palette import COOPERATIVE, EO, FUSION, IR, LASER, RADAR, TRACKER
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.block.mark import Mark, distinguish_marks, marks_of
+from dsa_des.block.mark import Mark, distinguish_marks, plot_mark_by_name
 from dsa_des.record.drawing import figure_text
 
 FONT_SIZE = 8
@@ -53,7 +53,9 @@ def sensor_marks(
     """
     classes = {name: type(blocks[name]) if name in blocks else None for name in names}
     carrying = carrying or {}
-    return recolour_by_platform(marks_of(classes), carrying, platform_colours(carrying.values()))
+    return recolour_by_platform(
+        plot_mark_by_name(classes), carrying, platform_colours(carrying.values())
+    )
 
 
 def platform_colours(platforms: Iterable[str]) -> dict[str, str]:
@@ -121,7 +123,7 @@ def _luminance(parts: list[int]) -> float:
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
 
 
-def stagger_marks(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:
+def staggered_mark_indices(along_px: FloatArray, spacing_px: float, phase: float) -> IntArray:
     """Return the indices of marks about `spacing_px` apart along a path, ascending.
 
     Several sensors that mark the same path take turns on it, each at its `phase`, a share of the
@@ -140,12 +142,12 @@ def spread_indices(count: int, most: int) -> IntArray:
     return np.linspace(0, count - 1, most).astype(np.int64)
 
 
-def alternate_marks(
+def alternating_mark_indices(
     along_px: FloatArray, styles: Mapping[str, Mark], name: str, shift: float = 0.0
 ) -> IntArray:
     """Return indices along a path at which this sensor is marked, so that sensors take turns."""
     phase = list(styles).index(name) / len(styles) + shift
-    return stagger_marks(along_px, _SPACING_PX * len(styles), phase)
+    return staggered_mark_indices(along_px, _SPACING_PX * len(styles), phase)
 
 
 def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
@@ -196,7 +198,7 @@ def draw_lines(axes: Any, targets: Sequence[FloatArray], own: FloatArray | None 
     from matplotlib.collections import LineCollection
 
     if dense := len(targets) >= DENSE:
-        draw_density(axes, targets)
+        draw_line_density(axes, targets)
     lines = (
         [] if dense else [(line, TARGET, 0.6 if len(targets) >= MANY else 1.0) for line in targets]
     )
@@ -230,7 +232,7 @@ def add_grid(axes: Any) -> None:
     axes.set_axisbelow(True)
 
 
-def draw_density(axes: Any, lines: Sequence[FloatArray]) -> None:
+def draw_line_density(axes: Any, lines: Sequence[FloatArray]) -> None:
     """Draw how many lines (points, 2) cross each cell of the axes as a shade of grey."""
     from matplotlib.colors import LogNorm
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from components.display.outcomes import NEAR_M, select_platform
 from dsa_des.record.failure_counts import failure_sentences
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 MOST_TARGETS = 10
 MOST_IN_A_LINE = 4
@@ -62,16 +62,16 @@ def _print_platform_results(console: Any, summary: dict[str, Any], platform: str
             console,
             "Fused instants by combination of sensors (each target counts)",
             ("sensors", "fused>"),
-            [(name, f"{count:,}") for name, count in _sort_by_size(summary["fused"])],
+            [(name, f"{count:,}") for name, count in _sort_by_number_of_sensors(summary["fused"])],
         )
     if summary.get("targets"):
-        _show_closest(console, summary["targets"], platform)
+        _print_closest_approaches(console, summary["targets"], platform)
     for line in outcome_lines(summary):
         _print_line(console, line)
 
 
 def distance_text(range_m: float | None) -> str:
-    """Return a distance as text, in m below 1 km and else in km; None is unknown."""
+    """Return a distance as text, in m below 1 km, else in km; the word unknown for None."""
     if range_m is None:
         return "unknown"
     if round(range_m, 1) < 1000:
@@ -116,7 +116,9 @@ _WHY_NOT_SEEN = {
 
 
 def cut_off_detection_lines(sensors: dict[str, Any]) -> list[str]:
-    """Return a line on the asterisk of detections cut off by the run's start or end, or nothing."""
+    """Return one line explaining the asterisk of detections cut off by the run's start or end;
+    empty if there are none.
+    """
     ends = {
         f"{which} at {seen['at']}"
         for entry in sensors.values()
@@ -197,7 +199,7 @@ def _tracks_text(entry: dict[str, Any]) -> str:
         for name, first in _earliest_targets(entry["targets"])
     ]
     text += f"; first within {NEAR_M:g} m of {', '.join(firsts)}"
-    return text + _more_text(entry["targets"])
+    return text + _further_targets_text(entry["targets"])
 
 
 def _time_and_range_text(first: dict[str, Any]) -> str:
@@ -215,7 +217,7 @@ def _targets_text(targets: dict[str, dict[str, float]]) -> str:
     if len(targets) == 1:
         return next(iter(targets))
     spans = [f"{name} {_span_text(entry)}" for name, entry in _earliest_targets(targets)]
-    return ", ".join(spans) + _more_text(targets)
+    return ", ".join(spans) + _further_targets_text(targets)
 
 
 def _earliest_targets(targets: dict[str, Any]) -> list[tuple[str, Any]]:
@@ -223,7 +225,7 @@ def _earliest_targets(targets: dict[str, Any]) -> list[tuple[str, Any]]:
     return sorted(targets.items(), key=lambda item: next(iter(item[1].values())))[:MOST_IN_A_LINE]
 
 
-def _more_text(targets: dict[str, Any]) -> str:
+def _further_targets_text(targets: dict[str, Any]) -> str:
     more = len(targets) - MOST_IN_A_LINE
     return f" and {more:,} more target{'s' if more > 1 else ''}" if more > 0 else ""
 
@@ -246,12 +248,12 @@ def derived_attitude_lines(traffic: dict[str, Any]) -> list[str]:
     return [line]
 
 
-def _sort_by_size(fused: dict[str, int]) -> list[tuple[str, int]]:
+def _sort_by_number_of_sensors(fused: dict[str, int]) -> list[tuple[str, int]]:
     """Return the sensor combinations with their counts, those of the fewest sensors first."""
     return sorted(fused.items(), key=lambda item: (item[0].count("+"), item[0]))
 
 
-def _show_closest(console: Any, targets: dict[str, Any], platform: str) -> None:
+def _print_closest_approaches(console: Any, targets: dict[str, Any], platform: str) -> None:
     met = [
         (entry["closest_approach"], name)
         for name, entry in targets.items()
@@ -304,4 +306,4 @@ def _print_table(
 
 def _print_line(console: Any, text: str) -> None:
     # Never wrapped: a path is there to be copied.
-    console.print(printable(text), markup=False, highlight=False, soft_wrap=True)
+    console.print(escape_unprintable(text), markup=False, highlight=False, soft_wrap=True)

@@ -22,7 +22,7 @@ from components.display.recorded_rows import (
 from components.display.symbols import (
     DENSE,
     MOST_NAMED,
-    alternate_marks,
+    alternating_mark_indices,
     draw_lines,
     draw_marks,
     label_line_ends,
@@ -106,7 +106,7 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     first = [one.first_hit_s for one in scans.values() if one.first_hit_s is not None]
     if first:
         anchor_s, what = min(first), "Around the first detection"
-    together = _find_first_combination(folder, len(scans))
+    together = _first_fusion_of_most_sensors(folder, len(scans))
     if together is not None:
         anchor_s, number = together
         word = {2: "two", 3: "three", 4: "four"}.get(number, str(number))
@@ -116,7 +116,7 @@ def find_close_up(scans: Scans, folder: Path, duration_s: float) -> CloseUp:
     return CloseUp(start_s, end_s, what, _fused_combinations(folder, start_s, end_s))
 
 
-def _find_first_combination(folder: Path, sensors: int) -> tuple[float, int] | None:
+def _first_fusion_of_most_sensors(folder: Path, sensors: int) -> tuple[float, int] | None:
     """Return the first time at which most sensors were fused, s, and how many; None if never."""
     best: tuple[float, int] | None = None
     for time_s, code, names in iterate_fused(folder):
@@ -279,7 +279,11 @@ def _draw_ranges(
 def _draw_detections(axes: Any, detected: Detected, name: str, px_per_s: float) -> None:
     points = np.column_stack((detected.time_s[name], detected.range_m[name] / 1000))
     kept = [
-        rows[alternate_marks(points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target)]
+        rows[
+            alternating_mark_indices(
+                points[rows, 0] * px_per_s, detected.styles, name, _GOLDEN * target
+            )
+        ]
         for target, rows in rows_by_target(detected.target[name])
     ]
     if kept:

@@ -10,9 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from components.display.outcomes import NEAR_M, TABLE, distances_to_targets, flights_seen_from
+from components.display.outcomes import (
+    NEAR_M,
+    TABLE,
+    distances_to_targets,
+    flights_of_other_aircraft,
+)
 from components.display.recorded_rows import iterate_row_groups, row_count
-from components.display.symbols import DENSE, Labels, draw_density
+from components.display.symbols import DENSE, Labels, draw_line_density
 from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import COVARIANCE, is_confirmed_or_coasted
 from components.metrics.true_states import TargetsInFrame
@@ -92,7 +97,7 @@ class DrawnTracks:
         self.blocks = sorted(set(columns["block"].tolist()))
         #: What each tracker may see.
         self.seen_by = {
-            block: TargetsInFrame(flights_seen_from(simulation, block), self.origin)
+            block: TargetsInFrame(flights_of_other_aircraft(simulation, block), self.origin)
             for block in self.blocks
         }
         several = len(self.blocks) > 1
@@ -158,11 +163,11 @@ def draw_tracks(path: Path, drawn: DrawnTracks) -> Path:
         _draw_legend(figure, drawn, false > 0, dense)
         fit_axes_to_texts(figure)
         figure.subplots_adjust(top=0.93)
-        _draw_names(figure, plan, drawn, positions, own)
+        _label_flights_and_tracks(figure, plan, drawn, positions, own)
         if dense:
-            draw_density(plan, [ned_m[[1, 0]].T / 1e3 for ned_m in positions])
+            draw_line_density(plan, [ned_m[[1, 0]].T / 1e3 for ned_m in positions])
             above = drawn.origin[2] - positions[:, 2]
-            draw_density(height, [np.column_stack([grid, line]) for line in above])
+            draw_line_density(height, [np.column_stack([grid, line]) for line in above])
     return path
 
 
@@ -236,7 +241,7 @@ def _draw_legend(figure: Any, drawn: DrawnTracks, false: bool, dense: bool) -> N
     figure.legend(handles=entries, loc="upper center", ncols=min(len(entries), 7), frameon=False)
 
 
-def _draw_names(
+def _label_flights_and_tracks(
     figure: Any, plan: Any, drawn: DrawnTracks, positions: FloatArray, own: FloatArray
 ) -> None:
     """Write aircraft names at the ends of flights and track numbers at their beginnings."""

@@ -13,7 +13,7 @@ from dsa_des.errors import Problem, SceneError, UsageError, did_you_mean
 from dsa_des.scene.block_table import Block
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.platforms import platform_by_block
-from dsa_des.scene.scene import Scene, load_tables
+from dsa_des.scene.scene import Scene, scene_from_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.time.randomness import Streams
 
@@ -30,7 +30,8 @@ def load_for_host(
     seed: int | None = None,
     platform: str | None = None,
 ) -> Scene:
-    """Return a host's scene, from a file or object; without traffic, it gets the host's block.
+    """Return a host's scene, from a file or object; one without traffic gets the block whose
+    aircraft the host moves.
 
     Of several platforms' chains only that of the one that the host's ownship is.
     """
@@ -50,7 +51,7 @@ def _load_scene(
     blocks = scene_file.data.get("blocks", {})
     if isinstance(blocks, dict) and _NAME not in blocks and not _has_traffic(scene_file):
         blocks[_NAME] = {"type": HOST}
-    return load_tables(scene_file, sets=sets, swaps=swaps, seed=seed)
+    return scene_from_tables(scene_file, sets=sets, swaps=swaps, seed=seed)
 
 
 def _select_platform(scene: Scene, platform: str) -> Scene:

@@ -6,7 +6,7 @@ from typing import Any, Self
 from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, Roster
-from components.messages.reach import farthest_look
+from components.messages.reach import combined_farthest_look
 from components.messages.targets import TrafficStates
 from dsa_des.block.component import Component, Output, Parameters
 from dsa_des.errors import Disagreements
@@ -59,7 +59,7 @@ class HostTraffic(Component):
         self.roster = Roster.from_pairs([(plane.name, plane) for plane in parameters.planes])
 
     def offer(self, port: str) -> Roster:
-        """Return the roster of targets, for consumers."""
+        """Return the roster, which lists the targets and their properties, for consumers."""
         return self.roster
 
     def natural_duration_s(self) -> Fraction:
@@ -68,7 +68,10 @@ class HostTraffic(Component):
 
     def setup(self) -> None:
         """Refuse sensors that need positions at instants that a host does not give."""
-        if farthest_look(consumer.request for consumer in self.context.consumers).lasts_s > 0.0:
+        if (
+            combined_farthest_look(consumer.request for consumer in self.context.consumers).lasts_s
+            > 0.0
+        ):
             raise ValueError(
                 "a sensor needs to know where aircraft are at instants between the host's calls, "
                 "as beam_sweep, measures_range_rate and moving_target_filter do: a host program "

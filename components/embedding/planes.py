@@ -15,7 +15,7 @@ from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.parameter_errors import explain_validation_error
-from dsa_des.scene.scene_file import SceneFile, merge, read_scene_file
+from dsa_des.scene.scene_file import SceneFile, merge_tables_in_place, read_scene_file
 
 _CALL = "add_plane"
 
@@ -47,12 +47,12 @@ def make_plane(name: str, aircraft: object, values: Mapping[str, Any]) -> Plane:
         # Tables are models already; what overrides them does so key by key.
         described.data |= {key: getattr(aircraft, key).model_dump() for key in ("eo", "ir")}
     elif isinstance(aircraft, Mapping):
-        merge(described.data, aircraft)
+        merge_tables_in_place(described.data, aircraft)
     elif aircraft is not None:
         message = "must be a file, an Aircraft or a mapping of its keys"
         raise SceneError([Problem(_CALL, "aircraft", message, aircraft)])
     given = {key: value for key, value in values.items() if value is not None}
-    merge(described.data, given)
+    merge_tables_in_place(described.data, given)
     described.sources.update({(key,): _CALL for key in ("name", *given)})
     described.data["name"] = name
     try:

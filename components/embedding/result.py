@@ -120,10 +120,11 @@ def _sighting_text(one: Sighting) -> str:
     return f"{name}: azimuth {azimuth:.2f}°, elevation {elevation:.2f}°{range_m}, by {seen}"
 
 
-def sightings_of(
+def sightings_and_false_alarms(
     fused: FusedDetections | None, detections: Mapping[str, Detections]
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
-    """Return sightings of detected planes by index in the roster, and the false alarms.
+    """Return sightings of detected planes by the planes' index, and sightings that are false
+    alarms.
 
     From one row of each message of a call; `fused` is None when no sensor reported.
     """

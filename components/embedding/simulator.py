@@ -16,8 +16,8 @@ from components.embedding.host_scene import (
     with_host_traffic,
 )
 from components.embedding.planes import FixedPath, make_plane, plane_index
-from components.embedding.result import EncounterResult, Sighting, sightings_of
-from components.embedding.states import check_rows, traffic_states
+from components.embedding.result import EncounterResult, Sighting, sightings_and_false_alarms
+from components.embedding.states import checked_pose_rows, traffic_states
 from components.messages.detections import Detections
 from components.messages.fused import FusedDetections
 from dsa_des.embed import HostDriven, Step
@@ -237,7 +237,7 @@ class Simulator:
             self.start(plane_by_plane=wanted)
         if wanted != self._plane_by_plane:
             raise ValueError("a host calls for all planes at once or plane by plane, not both")
-        own = check_rows("ownship", lla_ownship, att_ownship, 1, missing=False)
+        own = checked_pose_rows("ownship", lla_ownship, att_ownship, 1, missing=False)
         if plane is None:
             chain, chosen = self._chains[0], None
             free = self._free
@@ -245,14 +245,16 @@ class Simulator:
             number = plane_index(plane, self.planes)
             chain, chosen = self._chains[number], [number]
             free = [] if number in self._fixed else [number]
-        moved = check_rows("intruder", lla_intruder, att_intruder, len(free))
+        moved = checked_pose_rows("intruder", lla_intruder, att_intruder, len(free))
         tick = chain.tick_of(time_s)
         step = chain.start_step(tick)
         planes_asked = range(len(self._planes)) if chosen is None else chosen
         if step.scans:
             rows = moved
             if len(free) != len(planes_asked):
-                rows = self._plane_rows(moved, free, planes_asked, tick / chain.ticks_per_s)
+                rows = self._poses_of_asked_planes(
+                    moved, free, planes_asked, tick / chain.ticks_per_s
+                )
             traffic: Any = chain.components[self._source]
             chain.run(step, traffic_states(own, rows, tick, traffic.roster, chosen))
         return self._make_result(step, planes_asked, chain.ticks_per_s)
@@ -289,7 +291,7 @@ class Simulator:
             step = chain.start_step(chain.tick_of(chain.next_scan_s()))
             chain.run(step, traffic_states(own, rows, step.tick, traffic.roster, None))
 
-    def _plane_rows(
+    def _poses_of_asked_planes(
         self, moved: Any, free: list[int], planes_asked: Sequence[int], time_s: float
     ) -> Any:
         """Return lat, lon, alt, yaw, pitch, roll of the asked planes, (planes, 6): those the host
@@ -306,7 +308,7 @@ class Simulator:
     ) -> EncounterResult:
         messages: dict[str, Any] = {name: message for (name, _), message in step.sent.items()}
         reported = {n: m for n, m in messages.items() if isinstance(m, Detections)}
-        seen, false = sightings_of(messages.get(self._fusion), reported)
+        seen, false = sightings_and_false_alarms(messages.get(self._fusion), reported)
         sightings = tuple(seen.get(number) or self._unseen[number] for number in planes_asked)
         return EncounterResult(
             step.tick / ticks_per_s,

@@ -10,7 +10,7 @@ from components.arguments.checks import HIGHEST_ALTITUDE_M, LARGEST, LOWEST_ALTI
 from components.geometry import POSE_FIELDS
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.types import FloatArray
-from dsa_des.errors import shown_value
+from dsa_des.errors import shortened_repr
 
 _NAMES = ("latitude", "longitude", "altitude", "yaw", "pitch", "roll")
 # A latitude of 90° that came through radians may be a last digit above pi/2.
@@ -26,10 +26,10 @@ def to_numbers(label: str, value: object) -> FloatArray:
     try:
         return np.asarray(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ValueError(f"{label} is {shown_value(value)}: it must hold numbers") from error
+        raise ValueError(f"{label} is {shortened_repr(value)}: it must hold numbers") from error
 
 
-def check_rows(
+def checked_pose_rows(
     who: str, lla: ArrayLike, att: ArrayLike, count: int, *, missing: bool = True
 ) -> FloatArray:
     """Return latitude, longitude, altitude, yaw, pitch, roll as rows (count, 6), checked.
@@ -72,7 +72,7 @@ def check_rows(
 def traffic_states(
     own: FloatArray, rows: FloatArray, tick: int, roster: Roster, chosen: list[int] | None
 ) -> TrafficStates:
-    """Return one tick's traffic message, of the ownship's row and rows from `check_rows`.
+    """Return one tick's traffic message, of the ownship's row and rows from `checked_pose_rows`.
 
     `chosen` are the planes of the roster that the rows are; None for all.
     """

@@ -13,7 +13,7 @@ from components.formats.encounter_set import LARGEST_WEIGHT
 from components.formats.text_rows import csv_table
 from components.metrics.risk import RiskRatio, risk_ratio, risk_ratios_by_class
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.errors import UsageError, did_you_mean, shown_value
+from dsa_des.errors import UsageError, did_you_mean, shortened_repr
 from dsa_des.files.input_files import (
     InputFileError,
     is_folder,
@@ -122,7 +122,7 @@ def numbers_and_errors(
 ) -> tuple[FloatArray, dict[int, str]]:
     """Return a column as numbers (flags 0 or 1, else at least 0), and the error of each bad row."""
     cells = table.column(name, option)
-    values = np.array([_number(cell) for cell in cells])
+    values = np.array([_number_or_nan(cell) for cell in cells])
     with np.errstate(invalid="ignore"):
         zero_one = (values == 0.0) | (values == 1.0)
         good = zero_one if flag else (values >= 0.0) & (values <= LARGEST_WEIGHT)
@@ -131,13 +131,13 @@ def numbers_and_errors(
     wrong = {
         row: f"{name} is missing: {allowed}"
         if cells[row] is None
-        else f"{name} = {shown_value(cells[row])}: {allowed}"
+        else f"{name} = {shortened_repr(cells[row])}: {allowed}"
         for row in np.flatnonzero(~good).tolist()
     }
     return values, wrong
 
 
-def _number(cell: object) -> float:
+def _number_or_nan(cell: object) -> float:
     if isinstance(cell, str):
         low = cell.lower()
         if low in ("true", "false"):

@@ -89,7 +89,7 @@ def _make_flights(keys: Sequence[tuple[EncounterSet, int, str]]) -> list[list[Sa
     ]  # fmt: skip
     alike: dict[Any, list[int]] = {}
     for number, (of, row, dynamics) in enumerate(aircraft):
-        lasts = number if of.kind == TRACKS else of.seconds(row)
+        lasts = number if of.kind == TRACKS else of.flown_seconds_of_row(row)
         alike.setdefault((of.kind, lasts, of.reference_deg, dynamics), []).append(number)
     made: dict[int, SampledTrajectory] = {}
     for numbers in alike.values():
@@ -236,8 +236,10 @@ class _EncounterTraffic(RecordedTraffic):
         return f" of {len(self.encounter_set)}"
 
     @classmethod
-    def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
-        """Return for each block's parameters the set of its encounter and the index there."""
+    def choose_encounters(cls, parameters: Sequence[Any]) -> list[Encounter]:
+        """Return for each block's parameters an encounter set and the index of the encounter in
+        it.
+        """
         return [encounter_of_parameters(cls, p) for p in parameters]
 
     @classmethod
@@ -296,8 +298,10 @@ class ModelTraffic(_EncounterTraffic):
         return ""
 
     @classmethod
-    def choose(cls, parameters: Sequence[Any]) -> list[Encounter]:
-        """Return each block's encounter as a set and an index there, all sampled at once."""
+    def choose_encounters(cls, parameters: Sequence[Any]) -> list[Encounter]:
+        """Return for each block's parameters a sampled set and the index of its encounter, all
+        sampled at once.
+        """
         keys = [_pair_key(p) for p in parameters]
         _PAIRS.prepare(keys)
         return [_PAIRS[key] for key in keys]
@@ -310,7 +314,9 @@ class ModelTraffic(_EncounterTraffic):
 
 
 def encounter_of_parameters(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the encounter set that a block's parameters name, at its own origin, and the index."""
+    """Return the encounter set that a block's parameters name, not moved, and the encounter's index
+    in it.
+    """
     if issubclass(cls, ModelTraffic):
         found: Encounter = _PAIRS[_pair_key(parameters)]
         return found
@@ -372,8 +378,8 @@ def _pair_key(parameters: Any) -> tuple[_Model, int]:
 
 
 def _sample_pairs(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
-    """Return for each model and number the set that holds its encounter and the index there;
-    encounters of one model are sampled together.
+    """Return for each model and number a set and the index of its encounter there; those of one
+    model are sampled together.
     """
     numbers_of: dict[_Model, set[int]] = {}
     for model, number in keys:

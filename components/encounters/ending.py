@@ -78,7 +78,7 @@ class ClosestApproachPassed(Component):
         states = wake["states"]
         if states is None or len(states.columns) == 0:
             return None
-        range_m, present = self._ranges_m(states)
+        range_m, present = self._ranges_m_and_presence(states)
         starts = wake.instants.first_position_of_runs
         numbers = wake.run[starts]
         shape = range_m.shape[1], len(numbers)
@@ -114,10 +114,10 @@ class ClosestApproachPassed(Component):
         ends = np.append(starts[1:], len(wake)) - 1
         now = {"range_m": now_m[ends].T, "since": since[ends].T, "seen": seen[ends].T}
         newer = KeyedTable(replica=numbers, **now)
-        self._known = self._known.replace_runs(numbers, newer, wake.first_run)
+        self._known = self._known.replace_and_drop_earlier_runs(numbers, newer, wake.first_run)
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
 
-    def _ranges_m(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:
+    def _ranges_m_and_presence(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:
         """Return the distances (rows, pairs) in m between all aircraft or from the ownship, and
         whether both are present.
         """

@@ -18,8 +18,8 @@ from components.encounters.sampling import EncounterDraws
 from components.flights.closest_geometry import (
     SENSES,
     Approach,
+    both_intruder_headings_rad,
     fly_paths,
-    intruder_headings,
     project_to_north_east_m,
 )
 from components.formats.encounter_set import (
@@ -31,7 +31,7 @@ from components.formats.encounter_set import (
 )
 from components.formats.set_file import EncounterSetError, is_origin
 from dsa_des.arrays.types import FloatArray
-from dsa_des.errors import UsageError, did_you_mean, shown_value
+from dsa_des.errors import UsageError, did_you_mean, shortened_repr
 from dsa_des.errors.budgets import check_sample_count
 from dsa_des.files.input_files import (
     InputFileError,
@@ -114,7 +114,7 @@ class _Recipes:
         self.wrong: list[str] = []
 
     def add_error(self, key: str, message: str) -> None:
-        shown = f" = {shown_value(self.tables[key])}" if key in self.tables else ""
+        shown = f" = {shortened_repr(self.tables[key])}" if key in self.tables else ""
         self.wrong.append(f"{self.path}: {key}{shown}: {message}")
 
     def make_recipe(self) -> Recipe:
@@ -223,7 +223,7 @@ class _Recipes:
 def _available_courses(one: Mapping[str, Any]) -> list[int]:
     """Return which of courses 0 and 1 lead an intruder of this speed to the wanted bearing."""
     speeds = np.array([one["own_speed"]]), np.array([one["intruder_speed"]])
-    both = intruder_headings(np.zeros(1), *speeds, np.array([one["bearing"]]))
+    both = both_intruder_headings_rad(np.zeros(1), *speeds, np.array([one["bearing"]]))
     return [k for k, heading in enumerate(both) if not np.isnan(heading[0])]
 
 
@@ -295,7 +295,9 @@ def _raise_impossible_encounter(
 
 def _intruder_headings(recipe: Recipe, combination: Any, v: dict[str, FloatArray]) -> FloatArray:
     """Return intruder headings, rad, for the wanted geometry; NaN where none gives the bearing."""
-    both = intruder_headings(v["own_heading"], v["own_speed"], v["intruder_speed"], v["bearing"])
+    both = both_intruder_headings_rad(
+        v["own_heading"], v["own_speed"], v["intruder_speed"], v["bearing"]
+    )
     course = np.full(len(combination), np.nan)
     wanted = np.array([recipe.geometries[c] for c in combination])
     for k, heading in enumerate(both):

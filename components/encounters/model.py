@@ -36,24 +36,24 @@ class NetworkNode:
     counts: FloatArray
 
     @cached_property
-    def totals(self) -> FloatArray:
+    def count_totals(self) -> FloatArray:
         """Sum of the counts for each combination of the parents' bins, shape (columns,)."""
         return self.counts.sum(axis=1)
 
     @cached_property
-    def empty(self) -> BoolArray:
+    def has_no_counts(self) -> BoolArray:
         """Whether all counts are 0 for each combination of the parents' bins, shape (columns,)."""
-        return self.totals == 0.0
+        return self.count_totals == 0.0
 
     @cached_property
     def probabilities(self) -> FloatArray:
         """Bin probabilities given parents (columns, size); of all where a column lacks counts."""
-        filled = np.where(self.empty[:, np.newaxis], self.counts.sum(axis=0), self.counts)
+        filled = np.where(self.has_no_counts[:, np.newaxis], self.counts.sum(axis=0), self.counts)
         result: FloatArray = filled / filled.sum(axis=1, keepdims=True)
         return result
 
     @cached_property
-    def edges(self) -> FloatArray:
+    def cumulative_probabilities(self) -> FloatArray:
         """Cumulative probabilities 0 to 1 between bins given parents, (columns, size + 1)."""
         summed = np.cumsum(self.probabilities, axis=1)
         # Exactly 1 from the last bin on that can be drawn: rounding must not open a bin without
@@ -63,9 +63,9 @@ class NetworkNode:
         return np.concatenate([np.zeros((len(summed), 1)), summed], axis=1)
 
     @cached_property
-    def flat_edges(self) -> FloatArray:
+    def flat_cumulative_probabilities(self) -> FloatArray:
         """Elements of `edges`, row after row, shape (columns x (size + 1),)."""
-        return np.ascontiguousarray(self.edges).reshape(-1)
+        return np.ascontiguousarray(self.cumulative_probabilities).reshape(-1)
 
     def column_of_parent_bins(self, bins: Sequence[IntArray] | IntArray) -> IntArray:
         """Return the column index (n,) for the parents' bins, given all variables' bins."""

@@ -21,7 +21,7 @@ from components.encounters.pair_densities import (
 from components.encounters.pairing import (
     COURSES,
     PairSampler,
-    draw_courses,
+    draw_intruder_courses_rad,
     encounter_set_of_pairs,
     is_pair_accepted,
 )
@@ -29,7 +29,7 @@ from components.encounters.sampling import EncounterDraws, SampledTracks, TrackS
 from components.encounters.track_rules import TrackError, TrackRules, sample_accepted_tracks
 from components.formats.encounter_set import NAMES, EncounterSet
 from components.formats.public_formats import SET, set_of_tracks
-from components.formats.recorded.known_kinds import record
+from components.formats.recorded.known_kinds import recording_of_file
 from components.formats.recorded.paired_tracks import (
     TrackWindows,
     is_flying,
@@ -75,9 +75,11 @@ def sample_tracks(
     each = _RAW_ROW if raw else _FLOWN_ROW
     if long := describe_long_work(asked, count * (seconds + 1), *each):
         say(f"note: {long}", err=True)
-    batches = _sample_raw(encounter_model, seed, range(first, first + count), seconds)
+    batches = _raw_track_batches(encounter_model, seed, range(first, first + count), seconds)
     if not raw:
-        batches = _fly_tracks(encounter_model, seed, range(first, first + count), seconds, dynamics)
+        batches = _accepted_track_batches(
+            encounter_model, seed, range(first, first + count), seconds, dynamics
+        )
     try:
         rows = _write_csv(path, batches)
     except TrackError as error:
@@ -102,7 +104,7 @@ def open_model(text: str) -> EncounterModel:
 _Columns = dict[str, AnyArray]
 
 
-def _sample_raw(
+def _raw_track_batches(
     model: EncounterModel, seed: int, numbers: range, seconds: int
 ) -> Iterator[_Columns]:
     """Yield batches of columns with every track's sampled variables, before any rejection."""
@@ -129,7 +131,7 @@ def _track_columns(model: EncounterModel, tracks: SampledTracks, seconds: int) -
     return columns
 
 
-def _fly_tracks(
+def _accepted_track_batches(
     model: EncounterModel, seed: int, numbers: range, seconds: int, dynamics: str
 ) -> Iterator[_Columns]:
     """Yield batches of accepted tracks as columns: variables, positions and motion each second."""
@@ -264,7 +266,7 @@ def _write_recorded_pairs(
         if not is_folder(place):
             raise UsageError(f"--tracks {folder}: must be a folder of recorded flights")
         files = sorted(p for p in place.iterdir() if p.is_file() and p.name[0] != ".")
-        flights = [one for file in files for one in record(file).samples.values()]
+        flights = [one for file in files for one in recording_of_file(file).samples.values()]
     except InputFileError as error:
         raise UsageError(f"--tracks {folder}: {error}") from None
     except TrafficFileError as error:
@@ -305,14 +307,14 @@ def _pair_recorded_flights(
     for attempt in range(_MOST_TRIES):
         drawn = draws.uniform(who, 4 + 2 * COURSES, attempt)
         (first, own), (second, other) = (
-            windows.draw_window(float(share[0])) for share in drawn[:2]
+            windows.window_at_share(float(share[0])) for share in drawn[:2]
         )
         speeds = [windows.velocity_at_closest(path) for path in (own, other)]
         if first == second or not all(map(is_flying, speeds)):
             continue
         level = [np.array([np.hypot(v[0], v[1])]) / FOOT_M for v in speeds]
         climb = np.array([speeds[1][2] - speeds[0][2]]) / FOOT_M
-        course = draw_courses(level[0], level[1], climb, drawn[4:])
+        course = draw_intruder_courses_rad(level[0], level[1], climb, drawn[4:])
         density, accept = rules.horizontal_ft, rules.vertical_ft
         miss_ft = density.quantile_of_area(drawn[2] * density.area)
         up_ft = accept.quantile_of_area(drawn[3] * accept.area)

@@ -23,7 +23,7 @@ from components.encounters.model import (
     make_network,
 )
 from dsa_des.arrays.types import FloatArray, IntArray
-from dsa_des.errors import did_you_mean, shown_value
+from dsa_des.errors import did_you_mean, shortened_repr
 from dsa_des.files.input_files import InputFileError, cache_file_reads, read_input_text
 
 PARTS = (
@@ -95,9 +95,9 @@ class _ModelReader:
         self, name: str, expected: str | None, parts: dict[str, tuple[int, _Rows]]
     ) -> str:
         if name in parts:
-            return f"the part {shown_value(name)} stands there twice"
+            return f"the part {shortened_repr(name)} stands there twice"
         if name not in PARTS:
-            return f"there is no part {shown_value(name)}{did_you_mean(name, PARTS)}"
+            return f"there is no part {shortened_repr(name)}{did_you_mean(name, PARTS)}"
         if name == "boundaries" and expected == "labels_transition":
             return (
                 "its part '# labels_transition' is missing: a model of initial states alone, as "
@@ -151,8 +151,8 @@ class _ModelReader:
     def match_transition_variables(
         self, labels: tuple[str, ...], now: tuple[str, ...]
     ) -> tuple[tuple[int, ...], dict[int, int]]:
-        """Return for each transition variable the index of its initial variable (-1 at t + 1), and
-        for those at t + 1 the same as a dictionary.
+        """Return each transition variable's initial variable (index; -1 if it is at t + 1), and a
+        dictionary to it from the index of each one at t + 1.
         """
         number = self.parts["labels_transition"][1][0][0]
         sources, targets = [], {}
@@ -161,7 +161,7 @@ class _ModelReader:
             base = name.removesuffix(_NEXT if later else _NOW).strip()
             if base not in labels:
                 raise self.make_error(
-                    f"labels_transition: unknown variable {shown_value(name)}"
+                    f"labels_transition: unknown variable {shortened_repr(name)}"
                     f"{did_you_mean(base, labels)}",
                     number,
                 )
@@ -192,7 +192,7 @@ class _ModelReader:
                 value = _float_or_nan(word)
                 if not (math.isfinite(value) and value >= 0.0):
                     raise self.make_error(
-                        f"{part}: {shown_value(word)}: {what} of 0 or more", number
+                        f"{part}: {shortened_repr(word)}: {what} of 0 or more", number
                     )
                 values.append(value)
         if not values:
@@ -326,7 +326,7 @@ class _ModelReader:
         All nodes are counted over the same cases. A model whose nodes do not agree at all was not
         made by counting; its columns are probabilities all the same.
         """
-        totals = {node.name: math.fsum(node.totals) for node in initial.nodes.values()}
+        totals = {node.name: math.fsum(node.count_totals) for node in initial.nodes.values()}
         (common, many), *others = Counter(totals.values()).most_common()
         if not others:
             return ()

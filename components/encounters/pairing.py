@@ -134,7 +134,8 @@ class PairSampler:
     def _hopeful_proposals(
         self, numbers: IntArray, attempts: IntArray
     ) -> tuple[IntArray, AnyArray, AnyArray]:
-        """Return the indices of proposals whose first second does not already rule them out.
+        """Return the indices of proposals not ruled out by their first second, which aircraft's
+        layer is narrower (0 or 1), and the chance with which each was let through.
 
         With them go which aircraft's layer is the narrower one, whose altitude is kept, and the
         chance with which they were let through.
@@ -239,7 +240,7 @@ class PairSampler:
         ]
         first, second = (f.speed_ft_s[cpa] for f in flown)
         climb = flown[1].climb_ft_s[cpa] - flown[0].climb_ft_s[cpa]
-        course = draw_courses(first, second, climb, drawn[1:])
+        course = draw_intruder_courses_rad(first, second, climb, drawn[1:])
         density = self.rules.horizontal_ft
         horizontal = density.quantile_of_area(drawn[0] * density.area)
         north = second * np.cos(course) - first
@@ -323,7 +324,7 @@ def _concatenate(parts: list[Pairs]) -> Pairs:
     return Pairs(**{n: np.concatenate([getattr(p, n) for p in parts], axis=-1) for n in names})
 
 
-def draw_courses(
+def draw_intruder_courses_rad(
     first: FloatArray, second: FloatArray, climb: FloatArray, drawn: FloatArray
 ) -> FloatArray:
     """Return the intruder's course, rad, drawn by rejection in proportion to the relative speed.

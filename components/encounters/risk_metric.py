@@ -14,9 +14,9 @@ from pydantic import Field
 
 from components.encounters.encounter_traffic import Encounter, ModelTraffic, SetTraffic
 from components.formats.encounter_set import FAMILY, GEOMETRIES, geometry_class, pair_paths
-from components.metrics.losses import course_and_bearing_deg, nominal_geometry
+from components.metrics.losses import nearest_course_and_bearing_deg, nearest_meeting_geometry
 from components.metrics.risk import Mitigated, RiskParameters
-from components.metrics.separation import traffic_block
+from components.metrics.separation import only_traffic_block
 from components.well_clear.missed_cylinder import (
     Missed,
     probability_of_induced_entry,
@@ -42,14 +42,16 @@ from dsa_des.studies.metric import (
 
 def has_weights(scene: Scene) -> bool:
     """Return whether a scene's traffic is chosen from weighted encounters."""
-    return hasattr(traffic_block(scene).parameters, "encounter")
+    return hasattr(only_traffic_block(scene).parameters, "encounter")
 
 
 def encounters_of_replicas(group: Group) -> list[Encounter]:
-    """Return for each replica the set of its encounter and the index there."""
-    block = traffic_block(group.scene)
+    """Return for each replica the set of its encounter and the encounter's index in that set."""
+    block = only_traffic_block(group.scene)
     cls: Any = block.cls
-    return group.cached("encounters", lambda: cls.choose(group.parameters_of(block.name)))
+    return group.cached(
+        "encounters", lambda: cls.choose_encounters(group.parameters_of(block.name))
+    )
 
 
 class EncounterWeight(Metric):
@@ -58,7 +60,7 @@ class EncounterWeight(Metric):
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
         if not has_weights(scene):
-            block = traffic_block(scene)
+            block = only_traffic_block(scene)
             raise ValueError(
                 f"the traffic of the scene, {block.name!r}, has no encounters with weights: it "
                 "needs traffic.encounters or traffic.encounter_model"
@@ -83,7 +85,9 @@ class EncounterWeight(Metric):
         }  # fmt: skip
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the same three results, known before any flight."""
+        """Return number, weight and family of every replica's encounter, by name, before any
+        flight.
+        """
         return self.measure(group)
 
 
@@ -171,24 +175,30 @@ class RiskRatios(Mitigated):
         return result
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return, by name, everything but the ratios for every replica."""
+        """Return every replica's event flags, encounter, weight and classes, by name, without the
+        ratios.
+        """
         result = dict(super().measure(group))
         result |= self._weights_and_classes(group, result)
         if self.p.needless:
             commanded = np.zeros(len(group))
-            commanded[list(self.viewer_manoeuvres(group))] = 1.0
+            commanded[list(self.viewer_manoeuvres_by_replica(group))] = 1.0
             result |= {_COMMANDED: commanded, _NEEDLESS: result[_KEPT] * commanded}
         return result
 
     def unit_weights(self, group: Group) -> FloatArray:
-        """Return the weight of each replica's encounter; the base class's where it has none."""
+        """Return the weight of each replica's encounter, or the base class's weights if encounters
+        have none.
+        """
         if self._weight is None:
             return super().unit_weights(group)
         weights: FloatArray = self._weight.measure(group)["encounter_weight"]
         return weights
 
     def nominal_event_flags(self, group: Group) -> dict[str, AnyArray]:
-        """Return both events' flags unmanoeuvred, from straight paths if enough, else flights."""
+        """Return both events' flags without manoeuvres, from straight paths where they suffice,
+        else from flights.
+        """
         meeting = meetings_in_plane(group, self.p)
         if meeting is None:
             return super().nominal_event_flags(group)
@@ -203,20 +213,20 @@ class RiskRatios(Mitigated):
         """Return, by name, results that no manoeuvre changes, geometry of the closest approach, and
         guesses of the others.
         """
-        meeting, sizes_m = meetings_in_plane(group, self.p), self.p.sizes_m
+        meeting, sizes_m = meetings_in_plane(group, self.p), self.p.well_clear_and_nmac_sizes_m
         if meeting is None:
-            result = self._nominal_events(group)
-            geometry = partial(nominal_geometry, widen_cylinders(sizes_m))
+            result = self._nominal_flags_and_classes(group)
+            geometry = partial(nearest_meeting_geometry, widen_cylinders(sizes_m))
             closest, *misses_m = np.split(
                 self.evaluate_flights(group, geometry, steered=False), [7, 9]
             )
         else:
-            closest, result = meeting.closest, self._meeting_events(meeting)
+            closest, result = meeting.closest, self._meeting_flags_and_classes(meeting)
             misses_m = [meeting.beside_m, meeting.above_m]
             unsure = np.flatnonzero(meeting.unsure.any(axis=0) | self._is_class_unsure(meeting))
             if len(unsure):
                 few = Group(group.scene, [group.replicas[k] for k in unsure.tolist()], (), {})
-                for name, column in self._nominal_events(few).items():
+                for name, column in self._nominal_flags_and_classes(few).items():
                     result[name][unsure] = column
         if self._weight is not None:
             result |= self._weight.measure(group)
@@ -248,11 +258,11 @@ class RiskRatios(Mitigated):
         result[expected_column(_NEEDLESS)] = kept * _NEEDS * alone**-8.0
         return result
 
-    def _nominal_events(self, group: Group) -> dict[str, AnyArray]:
+    def _nominal_flags_and_classes(self, group: Group) -> dict[str, AnyArray]:
         """Return event flags and geometry classes of the replicas, flown without manoeuvres."""
         return {**super().nominal_event_flags(group), **self._nominal_classes(group)}
 
-    def _meeting_events(self, meeting: Meetings) -> dict[str, AnyArray]:
+    def _meeting_flags_and_classes(self, meeting: Meetings) -> dict[str, AnyArray]:
         """Return event flags and geometry classes computed from straight paths in the plane."""
         return _nominal_event_flags(meeting) | self._class_columns(*meeting.closest[5:])
 
@@ -272,7 +282,7 @@ class RiskRatios(Mitigated):
         if not self.p.by:
             return {}
         return self._class_columns(
-            *self.evaluate_flights(group, course_and_bearing_deg, steered=False)
+            *self.evaluate_flights(group, nearest_course_and_bearing_deg, steered=False)
         )
 
     def _class_columns(
@@ -290,7 +300,9 @@ class RiskRatios(Mitigated):
     def _weights_and_classes(
         self, group: Group, known: Mapping[str, AnyArray]
     ) -> dict[str, AnyArray]:
-        """Return replicas' weights and classes, and if they stay well clear without manoeuvres."""
+        """Return by name the replicas' weights and classes, and, if counted, 1 where they stay well
+        clear unmanoeuvred.
+        """
         result: dict[str, AnyArray] = {}
         if self.p.needless:
             result[_KEPT] = 1.0 - known["well_clear_lost_nominal"]
@@ -321,7 +333,7 @@ def bearing_sector(bearing_deg: FloatArray) -> AnyArray:
 
 def meetings_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
     """Return all runs' closest approaches on straight plane paths; None if the scene forbids it."""
-    block, scene = traffic_block(group.scene), group.scene
+    block, scene = only_traffic_block(group.scene), group.scene
     parameters = group.parameters_of(block.name)
     one = parameters[0]
     if (
@@ -337,4 +349,10 @@ def meetings_in_plane(group: Group, p: RiskRatioParameters) -> Meetings | None:
         pair_paths(encounters_of_replicas(group), one.dynamics),
         float(scene.duration_s or "inf"),
     )
-    return closest_meetings(paths, len(group), end_s, p.sizes_m, widen_cylinders(p.sizes_m))
+    return closest_meetings(
+        paths,
+        len(group),
+        end_s,
+        p.well_clear_and_nmac_sizes_m,
+        widen_cylinders(p.well_clear_and_nmac_sizes_m),
+    )

@@ -162,9 +162,12 @@ class _Step:
         self._moving = [part for part in parts if part[0] in moves]
         self._low, self._width = model.bins[variable].low, model.bins[variable].width
         self._rate = float(model.resample_rates_hz[variable])
-        begin, chance = node.edges[:, :-1], np.diff(node.edges, axis=1)
+        begin, chance = (
+            node.cumulative_probabilities[:, :-1],
+            np.diff(node.cumulative_probabilities, axis=1),
+        )
         # A bin without probability begins where no draw lies; an empty column is all of any bin.
-        empty = node.empty[:, np.newaxis]
+        empty = node.has_no_counts[:, np.newaxis]
         self._begin = np.where(empty, 0.0, np.where(chance > 0.0, begin, 2.0)).reshape(-1)
         with np.errstate(divide="ignore"):
             each = np.where(empty, 1.0, np.where(chance > 0.0, 1.0 / chance, 1.0))
@@ -212,7 +215,7 @@ def _draw_bins(
     node: NetworkNode, column: IntArray, uniform: FloatArray
 ) -> tuple[IntArray, FloatArray]:
     """Return the bin into which each draw falls, and where within it, as a share in [0, 1)."""
-    edges, at = node.flat_edges, column * (node.size + 1)
+    edges, at = node.flat_cumulative_probabilities, column * (node.size + 1)
     bins: IntArray = np.zeros(len(column), dtype=np.int64)
     for k in range(1, node.size):
         bins += uniform >= edges.take(at + k)

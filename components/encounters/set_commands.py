@@ -10,9 +10,13 @@ import numpy as np
 
 from components.encounters.encounter_tables import numbers_and_errors, read_table, select_good_rows
 from components.encounters.model_commands import check_origin
-from components.encounters.splitting import expected_copies, least_miss_in_nmac_sizes, split_set
+from components.encounters.splitting import (
+    expected_copy_counts,
+    least_miss_in_nmac_sizes,
+    split_set,
+)
 from components.formats.encounter_set import EncounterSet, geometry_class
-from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoints_of
+from components.formats.public_formats import SET, WAYPOINTS, read_encounters, waypoint_file_bytes
 from components.formats.recorded.encounter_tracks import recorded_tracks
 from components.formats.set_file import EncounterSetError, read_set, write_set
 from dsa_des.arrays.types import AnyArray, FloatArray
@@ -52,7 +56,7 @@ def convert_sets(
         if path.suffix.lower() == SET:
             write_set(path, {"made_by": "conversion"}, [encounters])
         else:
-            write_file(path, waypoints_of(encounters))
+            write_file(path, waypoint_file_bytes(encounters))
     except InputFileError as error:
         raise UsageError(str(error)) from None
     except EncounterSetError as error:
@@ -120,7 +124,7 @@ def closest_approaches(encounters: EncounterSet, indices: Sequence[int]) -> Clos
 
 def _closest_approach_figures(encounters: EncounterSet, index: int) -> tuple[float, ...]:
     best: tuple[float, tuple[float, ...]] = (math.inf, (math.nan,) * 5)
-    for both, a, b in encounters.common_samples(index):
+    for both, a, b in encounters.common_times_and_positions(index):
         if len(both) < 2:
             continue
         apart, step = b - a, np.diff(b - a)
@@ -271,7 +275,7 @@ def split_encounters(
     else:
         near = _value_by_encounter(encounters, scores, score, "--scores", "--score", least=True)
     try:
-        expected = expected_copies(
+        expected = expected_copy_counts(
             near, _parse_numbers("--levels", levels), _parse_numbers("--copies", copies)
         )
     except ValueError as error:

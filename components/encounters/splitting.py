@@ -24,7 +24,7 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 _NMAC = PRESETS["nmac"]
 
 
-def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) -> FloatArray:
+def expected_copy_counts(scores: FloatArray, levels: FloatArray, copies: FloatArray) -> FloatArray:
     """Return each encounter's expected copies, by how many falling levels its score is below.
 
     Levels (k,) fall; copies (k + 1,) go from those of no stage to those of the last.
@@ -45,7 +45,7 @@ def expected_copies(scores: FloatArray, levels: FloatArray, copies: FloatArray) 
     return result
 
 
-def draw_copies(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray:
+def draw_copy_counts(numbers: IntArray, expected: FloatArray, seed: int) -> IntArray:
     """Return each encounter's copies: the expected number rounded down or, by chance, up."""
     uniform = EncounterDraws(seed, "splitting").uniform_fast(numbers, 1)[0]
     result: IntArray = np.floor(expected).astype(np.int64) + (uniform < expected % 1.0)
@@ -56,7 +56,7 @@ def split_set(encounters: EncounterSet, expected: FloatArray, seed: int) -> Enco
     """Return a set of copies, numbered from 0, with divided weights and the number of the encounter
     they are copies of.
     """
-    many = draw_copies(encounters.numbers, expected, seed)
+    many = draw_copy_counts(encounters.numbers, expected, seed)
     indices = np.repeat(np.arange(len(encounters)), many)
     family: AnyArray = encounters.extra.get(FAMILY, encounters.numbers)
     made = encounters.take(indices)
@@ -76,7 +76,7 @@ def least_miss_in_nmac_sizes(encounters: EncounterSet, index: int) -> float:
     between two samples is left out: it is a score, and no estimate rests on it.
     """
     best = np.inf
-    for times, own, other in encounters.common_samples(index):
+    for times, own, other in encounters.common_times_and_positions(index):
         if len(times):
             north, east, up = other - own
             horizontal = np.hypot(north, east) / _NMAC.horizontal_m

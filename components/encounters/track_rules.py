@@ -113,7 +113,7 @@ class TrackRules:
             p for p in map(model.index_of, (GEOGRAPHY, AIRSPACE, LAYER)) if p is not None
         ]
         self._speed_ft_s, climbs = (
-            self._usual_limits(label) * factor
+            self._low_and_high_quantiles(label) * factor
             for label, factor in ((SPEED, FT_S_PER_KT), (CLIMB, 1.0 / 60.0))
         )
         self._climb_ft_s = np.abs(climbs).max(axis=0)
@@ -163,8 +163,8 @@ class TrackRules:
     def keeps_limits(
         self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray
     ) -> BoolArray:
-        """Return which tracks keep the limits of speed (ft/s) and vertical rate, and start faster
-        than they climb.
+        """Return a mask of tracks that keep the limits of speed (ft/s) and vertical rate, and whose
+        initial speed exceeds their vertical rate.
         """
         slowest, fastest = self._speed_ft_s[:, self._combination_index(tracks)]
         good: BoolArray = speed[0] > np.abs(climb_ft_s[0])
@@ -191,7 +191,7 @@ class TrackRules:
             result = result * self.model.initial.sizes[index] + tracks.initial_bins[index]
         return result
 
-    def _usual_limits(self, label: str) -> FloatArray:
+    def _low_and_high_quantiles(self, label: str) -> FloatArray:
         """Return a variable's low and high quantile by area, airspace, layer (2, combinations)."""
         index = self._index_of(label)
         edges = self.model.bins[index].edges

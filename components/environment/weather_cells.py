@@ -19,14 +19,15 @@ class Within(NamedTuple):
     leaves: FloatArray
 
 
-def path_share_in_disc(
+def disc_entry_and_exit_shares(
     way_north_m: FloatArray,
     way_east_m: FloatArray,
     centre_north_m: FloatArray,
     centre_east_m: FloatArray,
     radius_m: float,
 ) -> Within:
-    """Return at which shares straight paths from the origin enter and leave the air over a disc.
+    """Return at which shares (0 to 1) of their length straight paths from the origin enter and
+    leave the air over a disc; both 0 if missed.
 
     A path w from the origin enters and leaves a disc of radius r around c at shares
     (c·w -+ sqrt(r² w² - (c×w)²)) / w² of itself; one straight up is in it or not.
@@ -78,18 +79,18 @@ class WeatherCell(Parameters):
         moved_m = self.speed_mps * time_s
         return north + math.cos(towards) * moved_m, east + math.sin(towards) * moved_m
 
-    def path_share_in_cell(
+    def entry_and_exit_shares(
         self,
         own_place: Sequence[FloatArray],
         line: Sequence[FloatArray],
         time_s: FloatArray,
     ) -> Within:
-        """Return where lines of sight, given by azimuth from north, elevation and range, enter and
-        leave the cell.
+        """Return at which shares (0 to 1) of their length lines of sight (azimuth from north,
+        elevation, range) enter and leave the cell; both 0 if missed.
         """
         azimuth, elevation, range_m = line
         level_m = range_m * np.cos(elevation)
         way = level_m * np.cos(azimuth), level_m * np.sin(azimuth)
-        return path_share_in_disc(
+        return disc_entry_and_exit_shares(
             *way, *self.centre_offset_m(own_place, time_s), 1000.0 * self.radius_km
         )

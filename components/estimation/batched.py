@@ -13,7 +13,7 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray, IntArray
 
 
-def product(left: FloatArray, right: FloatArray) -> FloatArray:
+def matrix_product(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left · right for matrices (a, k, n) and (k, b, n)."""
     terms = zip(left.swapaxes(0, 1)[:, :, np.newaxis], right[:, np.newaxis], strict=True)
     column, row = next(terms)
@@ -28,7 +28,7 @@ def product(left: FloatArray, right: FloatArray) -> FloatArray:
 
 def multiply_by_transpose(left: FloatArray, right: FloatArray) -> FloatArray:
     """Return left · rightᵀ for matrices (a, k, n) and (b, k, n)."""
-    return product(left, right.swapaxes(0, 1))
+    return matrix_product(left, right.swapaxes(0, 1))
 
 
 def matrix_times_vector(matrix: FloatArray, vector: FloatArray) -> FloatArray:
@@ -67,7 +67,7 @@ def is_everything(which: IntArray, count: int) -> bool:
     return count < 3 or bool((which == np.arange(count)).all())
 
 
-def symmetric(matrix: FloatArray) -> FloatArray:
+def symmetrised(matrix: FloatArray) -> FloatArray:
     """Return the mean of matrices (d, d, n) and their transposes."""
     return 0.5 * (matrix + matrix.swapaxes(0, 1))
 

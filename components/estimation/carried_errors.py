@@ -21,12 +21,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from components.estimation.batched import (
+    matrix_product,
     matrix_times_vector,
     multiply_by_transpose,
-    product,
     select_tracks,
     squared_length,
-    symmetric,
+    symmetrised,
 )
 from components.estimation.frame import SensorPose
 from components.estimation.kalman import Moments
@@ -67,7 +67,7 @@ class MotionWithErrors:
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
         """Return states (d, n) after the time (n,)."""
-        errors, end = self._remaining_share(dt_s), _MOVING + len(self.lasts_s)
+        errors, end = self._remaining_error_shares(dt_s), _MOVING + len(self.lasts_s)
         moved = self.model.move(np.concatenate([state[:_MOVING], state[end:]]), dt_s)
         return np.concatenate([moved[:_MOVING], errors * state[_MOVING:end], moved[_MOVING:]])
 
@@ -75,25 +75,25 @@ class MotionWithErrors:
         """Return the derivative of `move` by the state, (d, d, n)."""
         end = _MOVING + len(self.lasts_s)
         own = np.concatenate([state[:_MOVING], state[end:]])
-        step = self._embed_matrix(self.model.jacobian(own, dt_s))
-        for i, kept in enumerate(self._remaining_share(dt_s)):
+        step = self._pad_with_zeros_for_errors(self.model.jacobian(own, dt_s))
+        for i, kept in enumerate(self._remaining_error_shares(dt_s)):
             step[_MOVING + i, _MOVING + i] = kept
         return step
 
     def noise(self, dt_s: FloatArray) -> FloatArray:
         """Return the covariance that motion and errors gain by noise in a time, (d, d, n)."""
-        added = self._embed_matrix(self.model.noise(dt_s))
-        for i, kept in enumerate(self._remaining_share(dt_s)):
+        added = self._pad_with_zeros_for_errors(self.model.noise(dt_s))
+        for i, kept in enumerate(self._remaining_error_shares(dt_s)):
             added[_MOVING + i, _MOVING + i] = 1.0 - kept * kept
         return added
 
-    def _remaining_share(self, dt_s: FloatArray) -> FloatArray:
+    def _remaining_error_shares(self, dt_s: FloatArray) -> FloatArray:
         """Return each error's share left after a time, (errors, n), alike for negative times."""
         apart = np.abs(dt_s)
         at_once = np.where(apart > 0.0, np.inf, 0.0)
         return np.exp(-np.stack([apart / t if t > 0.0 else at_once for t in self.lasts_s]))
 
-    def _embed_matrix(self, own: FloatArray) -> FloatArray:
+    def _pad_with_zeros_for_errors(self, own: FloatArray) -> FloatArray:
         """Return a motion model's matrix (d, d, n) with rows and columns of 0 added for errors."""
         end = _MOVING + len(self.lasts_s)
         whole = np.zeros((self.size, self.size, own.shape[2]))
@@ -129,7 +129,8 @@ class ReportedErrors:
     def with_track_covariances(
         self, covariance: FloatArray, velocity: FloatArray
     ) -> "ReportedErrors":
-        """Return these errors with the lead over late positions that track covariances hold.
+        """Return these errors with how far targets are ahead of late reports by the track
+        covariances; NaN where their velocity says otherwise.
 
         Later reports are late by the same: they tell nothing of it. The speed is known ever better
         and the way by which they are late with it, which would seem to tell; so they are as late
@@ -148,8 +149,9 @@ class ReportedErrors:
         return way if self.ahead_m is None else np.where(np.isnan(self.ahead_m), way, self.ahead_m)
 
     @property
-    def considered_components(self) -> BoolArray | None:
-        """Return which state components (k, n) late reports must not correct; None if none.
+    def uncorrected_components(self) -> BoolArray | None:
+        """Return a mask (k, n) of state components that late reports must not correct; None if no
+        report is late.
 
         All that an aircraft reports is late alike, so its reports do not tell by how much: only
         the errors of linearising would seem to.
@@ -171,22 +173,24 @@ class ReportedErrors:
         reported, by_position, cylinder = self._reported_states(state, pose)
         seen, slope = linearise(kind, reported, pose)
         whole = np.zeros((len(seen), _MOVING + len(self.ways), seen.shape[1]))
-        whole[:, :3] = product(slope[:, :3], by_position)
+        whole[:, :3] = matrix_product(slope[:, :3], by_position)
         if slope.shape[1] > 3:
             whole[:, 3:6] = slope[:, 3:6]
         if LATENCY in self.ways:
-            whole[:, 3:6] -= whole[:, :3] * self._sum_of_errors(state, LATENCY)
+            whole[:, 3:6] -= whole[:, :3] * self._sum_of_errors_of_way(state, LATENCY)
         effect = self._effects_in_cylinder(state, cylinder)
-        whole[:, _MOVING:] = product(slope, effect[: slope.shape[1]])
+        whole[:, _MOVING:] = matrix_product(slope, effect[: slope.shape[1]])
         return seen, whole
 
     def effects_on_reported_states(self, moving: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return how one deviation of each error moves position and velocity, (6, errors, n)."""
+        """Return the change of position and velocity by one standard deviation of each error, (6,
+        errors, n).
+        """
         state = np.zeros((_MOVING + len(self.ways), moving.shape[1]))
         state[:_MOVING] = moving
         return self._effects_in_cylinder(state, self._reported_states(state, pose)[2])
 
-    def _sum_of_errors(self, state: FloatArray, way: int) -> FloatArray:
+    def _sum_of_errors_of_way(self, state: FloatArray, way: int) -> FloatArray:
         total = np.zeros(state.shape[1])
         for i, one in enumerate(self.ways):
             if one == way:
@@ -200,17 +204,21 @@ class ReportedErrors:
         cylinder geometry about the sensor.
         """
         reported = state[:_MOVING].copy()
-        reported[3] += self._sum_of_errors(state, SPEED_NORTH)
-        reported[4] += self._sum_of_errors(state, SPEED_EAST)
-        reported[5] -= self._sum_of_errors(state, CLIMB)
+        reported[3] += self._sum_of_errors_of_way(state, SPEED_NORTH)
+        reported[4] += self._sum_of_errors_of_way(state, SPEED_EAST)
+        reported[5] -= self._sum_of_errors_of_way(state, CLIMB)
         if LATENCY in self.ways:
             i = self.ways.index(LATENCY)
             reported[:3] -= state[_MOVING + i] * self._lead_over_late_position_m(
                 state, self.deviation[i]
             )
-        height = self._sum_of_errors(state, HEIGHT)
-        reported[0] += self._sum_of_errors(state, NORTH) + self.age_s * (reported[3] - state[3])
-        reported[1] += self._sum_of_errors(state, EAST) + self.age_s * (reported[4] - state[4])
+        height = self._sum_of_errors_of_way(state, HEIGHT)
+        reported[0] += self._sum_of_errors_of_way(state, NORTH) + self.age_s * (
+            reported[3] - state[3]
+        )
+        reported[1] += self._sum_of_errors_of_way(state, EAST) + self.age_s * (
+            reported[4] - state[4]
+        )
         reported[2] += self.age_s * (reported[5] - state[5]) - np.where(self.at_range, 0.0, height)
         by_position = np.zeros((3, 3, state.shape[1]))
         for i in range(3):
@@ -223,9 +231,9 @@ class ReportedErrors:
             return reported, by_position, (x / safe, y / safe, safe, -z, far)
         # In a cylinder about the vertical: a bearing turns, a height leaves the range as it is.
         up = -z + np.where(self.at_range, height, 0.0)
-        distance = np.maximum(far + self._sum_of_errors(state, RANGE), 1.0)
+        distance = np.maximum(far + self._sum_of_errors_of_way(state, RANGE), 1.0)
         level = np.sqrt(np.maximum(distance**2 - up**2, (_LEVEL * distance) ** 2))
-        bearing = np.arctan2(y, x) + self._sum_of_errors(state, BEARING)
+        bearing = np.arctan2(y, x) + self._sum_of_errors_of_way(state, BEARING)
         cos, sin = np.cos(bearing), np.sin(bearing)
         turned = np.stack([level * cos, level * sin, -up]) + pose.position_m
         safe = np.maximum(ground, _LEVEL * far)
@@ -294,10 +302,12 @@ class Ages:
         """
         carried, now, age = self.position, self.velocity, self.position + self.late
         place, speed = model.jacobian(state, -age)[:3], model.jacobian(state, -now)[3:_MOVING]
-        by_speed = multiply_by_transpose(product(speed, model.noise(now)), speed)
-        both = multiply_by_transpose(product(place, model.noise(np.minimum(age, now))), speed)
+        by_speed = multiply_by_transpose(matrix_product(speed, model.noise(now)), speed)
+        both = multiply_by_transpose(
+            matrix_product(place, model.noise(np.minimum(age, now))), speed
+        )
         error = np.empty((_MOVING, _MOVING, len(age)))
-        error[:3, :3] = multiply_by_transpose(product(place, model.noise(age)), place)
+        error[:3, :3] = multiply_by_transpose(matrix_product(place, model.noise(age)), place)
         error[:3, :3] += carried * (both + both.swapaxes(0, 1)) + carried**2 * by_speed
         for i in range(3):
             error[i, i] += (2.0 * self.late) ** 2 * velocity_variance[i]
@@ -307,7 +317,7 @@ class Ages:
         shared[:, 3:] = -multiply_by_transpose(model.noise(np.minimum(self.since, now)), speed)
         shared[:, :3] = -multiply_by_transpose(model.noise(np.minimum(self.since, age)), place)
         shared[:, :3] += carried * shared[:, 3:]
-        return symmetric(error), shared
+        return symmetrised(error), shared
 
     def add_age_errors(
         self, moments: Moments, model: Motion, state: FloatArray, covariance: FloatArray
@@ -321,9 +331,9 @@ class Ages:
         error, shared = self.error_covariances(model, state, speeds)
         shared = _clip_cross_covariance(shared, error, covariance)
         known, seen = slope.shape[1], moments.jacobian.shape[1]
-        new = multiply_by_transpose(product(slope, error[:known, :known]), slope)
+        new = multiply_by_transpose(matrix_product(slope, error[:known, :known]), slope)
         with_state = multiply_by_transpose(shared[:, :known], slope)  # (d, m, n)
-        both = product(moments.jacobian, with_state[:seen])
+        both = matrix_product(moments.jacobian, with_state[:seen])
         own_error = new + both.swapaxes(0, 1)
         left_over = moments.left_over
         return replace(
@@ -352,15 +362,15 @@ class Ages:
             by_state[i, i + 3] += age
         by_state[:3] += carried * by_state[3:]
         slope = np.ascontiguousarray(moments.jacobian[:, :6])
-        more = product(slope, by_state)
+        more = matrix_product(slope, by_state)
         with_state = multiply_by_transpose(covariance, more)
         jacobian = more.copy()
         jacobian[:, : moments.jacobian.shape[1]] += moments.jacobian
-        both = product(more, moments.cross)
-        total = moments.total + both + both.swapaxes(0, 1) + product(more, with_state)
+        both = matrix_product(more, moments.cross)
+        total = moments.total + both + both.swapaxes(0, 1) + matrix_product(more, with_state)
         return replace(
             moments, expected=moments.expected + matrix_times_vector(slope, off),
-            total=symmetric(total),
+            total=symmetrised(total),
             cross=moments.cross + with_state, jacobian=jacobian,
         )  # fmt: skip
 

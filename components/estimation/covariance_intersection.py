@@ -16,13 +16,13 @@ import numpy as np
 
 from components.estimation.batched import (
     cholesky,
+    matrix_product,
     matrix_times_vector,
     multiply_by_transpose,
-    product,
     solve_lower,
     solve_lower_transposed,
     sum_in_order,
-    symmetric,
+    symmetrised,
 )
 from dsa_des.arrays.types import FloatArray
 
@@ -37,13 +37,15 @@ _CLOSE = 1e-15
 def intersect_covariances(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return state change, new covariance, and own weight (0 to 1), by covariance intersection."""
+    """Return the state's change, the new covariance, and the weight (0 to 1) of the given
+    covariance, by covariance intersection.
+    """
     root = cholesky(covariance)
-    scaled = product(product(root.swapaxes(0, 1), information), root)
+    scaled = matrix_product(matrix_product(root.swapaxes(0, 1), information), root)
     # LAPACK takes matrix by matrix: the result does not depend on the company.
-    values, axes = np.linalg.eigh(np.ascontiguousarray(symmetric(scaled).transpose(2, 0, 1)))
+    values, axes = np.linalg.eigh(np.ascontiguousarray(symmetrised(scaled).transpose(2, 0, 1)))
     eigenvalues = np.maximum(values.T, 0.0)
-    turned = product(root, np.ascontiguousarray(axes.transpose(1, 2, 0)))
+    turned = matrix_product(root, np.ascontiguousarray(axes.transpose(1, 2, 0)))
     if rule == "independent":
         weight, share = np.ones(covariance.shape[-1]), np.ones(covariance.shape[-1])
     else:
@@ -53,7 +55,7 @@ def intersect_covariances(
         weight = best_weight(eigenvalues, cost, 1 if rule == "determinant" else 2)
         share = 1.0 - weight
     spread = 1.0 / (weight + share * eigenvalues)
-    result = symmetric(multiply_by_transpose(turned * spread, turned))
+    result = symmetrised(multiply_by_transpose(turned * spread, turned))
     return share * matrix_times_vector(result, pull), result, weight
 
 
@@ -106,4 +108,4 @@ def inverse(covariance: FloatArray) -> FloatArray:
         solve_lower_transposed(root, solve_lower(root, np.ascontiguousarray(identity[:, j])))
         for j in range(size)
     ]
-    return symmetric(np.stack(whole, axis=1))
+    return symmetrised(np.stack(whole, axis=1))

@@ -19,7 +19,7 @@ from components.estimation.batched import (
     multiply_by_transpose,
     select_tracks,
     sum_in_order,
-    symmetric,
+    symmetrised,
 )
 from components.estimation.carried_errors import MotionWithErrors, ReportedErrors
 from components.estimation.frame import SensorPose
@@ -328,7 +328,7 @@ def mixture_by_track(
         for j in range(i, size):
             value = summed(share * (covariances[i, j] + apart[i] * apart[j]))
             spread[i, j] = spread[j, i] = value
-    return mean, symmetric(spread)
+    return mean, symmetrised(spread)
 
 
 def update_model_probabilities(
@@ -354,4 +354,4 @@ def mixture_moments(tracks: Estimates) -> tuple[FloatArray, FloatArray]:
         covariance += probabilities[i] * (
             covariances[i][:6, :6] + apart[:, np.newaxis] * apart[np.newaxis]
         )
-    return state, symmetric(covariance)
+    return state, symmetrised(covariance)

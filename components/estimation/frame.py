@@ -9,8 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.estimation.batched import Batch, matrix_times_vector, multiply_by_transpose, product
-from components.geometry import local_axes, ned_to_body_unchecked, north_east_up
+from components.estimation.batched import (
+    Batch,
+    matrix_product,
+    matrix_times_vector,
+    multiply_by_transpose,
+)
+from components.geometry import east_north_up_axes, ned_to_body_unchecked, north_east_up_offsets_m
 from dsa_des.arrays.types import FloatArray
 
 #: Three rows (n,), such as those of an array (3, n).
@@ -38,7 +43,7 @@ def pose_in_frame(
     lat, lon, alt = position_deg_m
     from_lat, from_lon, from_alt = origin_deg_m
     # np.array joins a few short arrays in a fifth of the time that np.stack takes.
-    north, east, up = north_east_up(from_lat, from_lon, from_alt, lat, lon, alt)
+    north, east, up = north_east_up_offsets_m(from_lat, from_lon, from_alt, lat, lon, alt)
     there, here = ned_axes(lat, lon), ned_axes(from_lat, from_lon)
     # The frame's axes (the last but one) along each axis of the aircraft's own horizon.
     horizon = [dot(axis[:, np.newaxis], np.array(here).swapaxes(0, 1)) for axis in there]
@@ -65,7 +70,7 @@ def _change_axes(vector: FloatArray, old: list[FloatArray], new: list[FloatArray
 
 def ned_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> list[FloatArray]:
     """Return unit vectors north, east and down at places, in Earth-centred axes, each (3, n)."""
-    east, north, up = (np.array(axis) for axis in local_axes(lat_deg, lon_deg))
+    east, north, up = (np.array(axis) for axis in east_north_up_axes(lat_deg, lon_deg))
     return [north, east, -up]
 
 
@@ -97,7 +102,7 @@ class FrameChange:
         turned = np.empty_like(covariance)
         for i in (0, 3):
             for j in (0, 3):
-                block = product(self.turn, covariance[i : i + 3, j : j + 3])
+                block = matrix_product(self.turn, covariance[i : i + 3, j : j + 3])
                 turned[i : i + 3, j : j + 3] = multiply_by_transpose(block, self.turn)
         return turned
 
@@ -107,7 +112,7 @@ def frame_change(old_deg_m: FloatArray, new_deg_m: FloatArray) -> FrameChange:
     longitude (deg) and height (m).
     """
     old, new = (tuple(np.ascontiguousarray(row) for row in rows) for rows in (old_deg_m, new_deg_m))
-    north, east, up = north_east_up(*new, *old)
+    north, east, up = north_east_up_offsets_m(*new, *old)
     there, here = ned_axes(old[0], old[1]), ned_axes(new[0], new[1])
     turn = np.empty((3, 3, np.size(north)))
     for i, to in enumerate(here):

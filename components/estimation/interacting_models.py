@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from components.estimation.batched import product, sum_in_order, symmetric
+from components.estimation.batched import matrix_product, sum_in_order, symmetrised
 from components.estimation.carried_errors import ReportedErrors
 from components.estimation.estimator import LEAST, Estimates, Estimator
 from components.estimation.frame import SensorPose
@@ -102,10 +102,10 @@ def transition_probabilities(rates_per_s: FloatArray, dt_s: FloatArray) -> Float
     identity = np.repeat(np.eye(size)[:, :, np.newaxis], len(dt_s), axis=2)
     total = identity.copy()
     for term in range(_TERMS, 0, -1):
-        total = identity + product(positive, total) / term
+        total = identity + matrix_product(positive, total) / term
     total = total * np.exp(-fastest * short)
     for done in range(int(squarings.max(initial=0))):
-        total = np.where(squarings > done, product(total, total), total)
+        total = np.where(squarings > done, matrix_product(total, total), total)
     sums = total.sum(axis=1, keepdims=True)
     return total / sums
 
@@ -134,7 +134,8 @@ def mix_models(
     for j in range(many):
         weights = [transitions[i, j] * probabilities[i] / predicted[j] for i in range(many)]
         given = [
-            _enter_model((states[i], covariances[i]), (states[j], covariances[j]), shared,
+            _converted_to_other_model((states[i], covariances[i]), (states[j], covariances[j]),
+            shared,
                       fresh[j] if fresh else None)
             for i in range(many)
         ]  # fmt: skip
@@ -144,7 +145,7 @@ def mix_models(
             apart = x - state
             covariance += weight * (whole + apart[:, np.newaxis] * apart[np.newaxis])
         new_states.append(state)
-        new_covariances.append(symmetric(covariance))
+        new_covariances.append(symmetrised(covariance))
     return new_states, new_covariances, predicted
 
 
@@ -161,7 +162,7 @@ def past_probabilities(
     return np.asarray(joint / np.maximum(sum_in_order(list(joint)), LEAST))
 
 
-def _enter_model(
+def _converted_to_other_model(
     given: tuple[FloatArray, FloatArray],
     own: tuple[FloatArray, FloatArray],
     shared: int,

@@ -13,12 +13,12 @@ from components.estimation.batched import (
     cholesky,
     is_everything,
     log_determinant_from_root,
+    matrix_product,
     multiply_by_transpose,
-    product,
     select_tracks,
     solve_lower,
     solve_lower_transposed,
-    symmetric,
+    symmetrised,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
@@ -84,7 +84,7 @@ class Moments:
 def linear_moments(expected: FloatArray, jacobian: FloatArray, covariance: FloatArray) -> Moments:
     """Return mean and covariance of the expected measurement, linearised by its Jacobian."""
     cross = multiply_by_transpose(covariance[:, : jacobian.shape[1]], jacobian)
-    return Moments(expected, product(jacobian, cross[: jacobian.shape[1]]), cross, jacobian)
+    return Moments(expected, matrix_product(jacobian, cross[: jacobian.shape[1]]), cross, jacobian)
 
 
 def innovation(
@@ -149,8 +149,8 @@ def joseph_covariance(
     if innovation.spread.ndim == 2:
         own = gain * innovation.spread[:, np.newaxis]
     else:
-        own = product(innovation.spread, gain)
-    error = product(innovation.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
+        own = matrix_product(innovation.spread, gain)
+    error = matrix_product(innovation.jacobian, block) - own  # (D Hᵀ - K R)ᵀ
     if innovation.shared is not None:
         # With errors that the state shares, S = H P Hᵀ + R + H M + (H M)ᵀ and K S = P Hᵀ + M:
         # D Hᵀ = K (R + H M) - M, and `spread` is R + (H M)ᵀ.
@@ -159,7 +159,7 @@ def joseph_covariance(
     for k in range(len(gain)):
         np.multiply(error[k, :, np.newaxis], gain[k, np.newaxis], out=term)
         block -= term
-    whole[measured, measured] = symmetric(block)
+    whole[measured, measured] = symmetrised(block)
     return whole
 
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from components.estimation.batched import (
+    matrix_product,
     matrix_times_vector,
     multiply_by_transpose,
-    product,
     squared_length,
 )
 from components.estimation.frame import SensorPose, dot
@@ -176,7 +176,7 @@ def cone_half_angle_rad(
 ) -> FloatArray:
     """Return the half angle, rad, of the cone about the expected direction of so many sigmas."""
     seen, by_position = linearise(Kind(has_range=False), position_m, pose)
-    spread = multiply_by_transpose(product(by_position, covariance), by_position)
+    spread = multiply_by_transpose(matrix_product(by_position, covariance), by_position)
     level = np.cos(seen[1])
     across, upward = spread[0, 0] * level * level, spread[1, 1]
     both = spread[0, 1] * level

@@ -17,11 +17,11 @@ relative one.
 import numpy as np
 
 from components.estimation.batched import (
+    matrix_product,
     matrix_times_vector,
     multiply_by_transpose,
-    product,
     squared_length,
-    symmetric,
+    symmetrised,
 )
 from components.estimation.frame import dot
 from dsa_des.arrays.types import FloatArray
@@ -98,10 +98,10 @@ def apply_correction_by_rotation(
     there[2, 0] = -along_then * sin_then - across_then * cos_then
     there[3, 0] = along_then * cos_then - across_then * sin_then
     there[2, 2], there[2, 3], there[3, 2], there[3, 3] = cos_then, -sin_then, sin_then, cos_then
-    step, rows = product(there, here), [0, 1, 3, 4]
-    spread[rows] = product(step, covariance[rows])
+    step, rows = matrix_product(there, here), [0, 1, 3, 4]
+    spread[rows] = matrix_product(step, covariance[rows])
     spread[:, rows] = multiply_by_transpose(spread[:, rows], step)
-    return moved, symmetric(spread)
+    return moved, symmetrised(spread)
 
 
 def update_with_first_range(
@@ -111,14 +111,16 @@ def update_with_first_range(
     variance_m2: FloatArray,
     sensor_m: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return states and covariances updated with tracks' first range, linear in its inverse."""
+    """Return Cartesian states and covariances updated with tracks' first range (m), corrected
+    linearly in its inverse by way of modified polar coordinates.
+    """
     measured = np.maximum(range_m, np.maximum(np.sqrt(variance_m2), _NEAREST_M))
     axes, distance, by_range, to_polar = _polar_geometry(state, sensor_m)
     whole = np.zeros_like(covariance)  # derivative of the polar state by the Cartesian one
     whole[:6, :6] = to_polar
     for i in range(6, len(state)):
         whole[i, i] = 1.0
-    spread = symmetric(multiply_by_transpose(product(whole, covariance), whole))
+    spread = symmetrised(multiply_by_transpose(matrix_product(whole, covariance), whole))
     error = variance_m2 / (measured * measured) / (measured * measured)
     gain = spread[:, 2] / (spread[2, 2] + error)
     left = -np.concatenate(
@@ -126,9 +128,9 @@ def update_with_first_range(
     )  # (I - K H), by its first three columns
     for i in range(3):
         left[i, i] += 1.0
-    shrunk = product(left, spread[:3])
+    shrunk = matrix_product(left, spread[:3])
     shrunk[3:] += spread[3:]
-    joseph = product(left, shrunk.swapaxes(0, 1)[:3])
+    joseph = matrix_product(left, shrunk.swapaxes(0, 1)[:3])
     joseph[3:] += shrunk.swapaxes(0, 1)[3:]
     joseph += gain[:, np.newaxis] * gain[np.newaxis] * error
     change = gain * (1.0 / measured - 1.0 / distance)
@@ -167,7 +169,7 @@ def _apply_polar_change(
 ) -> tuple[FloatArray, FloatArray]:
     """Return Cartesian state and covariance after polar coordinates change by `change` (6, n)."""
     row = to_polar[2:3]
-    spread = multiply_by_transpose(product(row, covariance[:6, :6]), row)[0, 0]
+    spread = multiply_by_transpose(matrix_product(row, covariance[:6, :6]), row)[0, 0]
     least = np.maximum(_LEAST * np.sqrt(np.maximum(spread, 0.0)), 1.0 / _FARTHEST_M)
     inverse = np.minimum(np.maximum(1.0 / distance + change[2], least), 1.0 / _NEAREST_M)
     by_range = by_range + change[3:]
@@ -175,13 +177,13 @@ def _apply_polar_change(
     moved = state.copy()
     moved[:3] = sensor_m + turned[0] / inverse
     moved[3:6] = sum(w * axis for w, axis in zip(by_range, turned, strict=True)) / inverse
-    step = product(_state_by_polar_jacobian(turned, change[1], inverse, by_range), to_polar)
+    step = matrix_product(_state_by_polar_jacobian(turned, change[1], inverse, by_range), to_polar)
     whole = covariance.copy()
-    whole[:6, :6] = multiply_by_transpose(product(step, covariance[:6, :6]), step)
+    whole[:6, :6] = multiply_by_transpose(matrix_product(step, covariance[:6, :6]), step)
     if len(state) > 6:
-        whole[:6, 6:] = product(step, covariance[:6, 6:])
+        whole[:6, 6:] = matrix_product(step, covariance[:6, 6:])
         whole[6:, :6] = whole[:6, 6:].swapaxes(0, 1)
-    return moved, symmetric(whole)
+    return moved, symmetrised(whole)
 
 
 def _line_of_sight_axes(line: FloatArray) -> list[FloatArray]:

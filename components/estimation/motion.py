@@ -13,7 +13,7 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from components.estimation.batched import multiply_by_transpose, product, symmetric
+from components.estimation.batched import matrix_product, multiply_by_transpose, symmetrised
 from dsa_des.arrays.types import FloatArray
 
 # Below this |turn rate · time| series take the place of quotients; their error is under 1e-17.
@@ -48,9 +48,9 @@ def predict(
     if isinstance(model, ConstantVelocity):
         return model.predict(state, covariance, dt_s)
     step = model.jacobian(state, dt_s)
-    spread = multiply_by_transpose(product(step, covariance), step)
+    spread = multiply_by_transpose(matrix_product(step, covariance), step)
     spread += model.noise(dt_s)
-    return model.move(state, dt_s), symmetric(spread)
+    return model.move(state, dt_s), symmetrised(spread)
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ class CoordinatedTurn:
 
     def move(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
         """Return states (7, n) after the time (n,)."""
-        along, across, _, _ = turn_factors(state[6], dt_s)
+        along, across, _, _ = turn_displacements_and_slopes(state[6], dt_s)
         cos, sin = np.cos(state[6] * dt_s), np.sin(state[6] * dt_s)
         north, east = state[3], state[4]
         moved = state.copy()
@@ -174,7 +174,7 @@ class CoordinatedTurn:
 
     def jacobian(self, state: FloatArray, dt_s: FloatArray) -> FloatArray:
         """Return the derivative of `move` by the state, (7, 7, n)."""
-        along, across, along_by_rate, across_by_rate = turn_factors(state[6], dt_s)
+        along, across, along_by_rate, across_by_rate = turn_displacements_and_slopes(state[6], dt_s)
         cos, sin = np.cos(state[6] * dt_s), np.sin(state[6] * dt_s)
         north, east = state[3], state[4]
         step = np.zeros((7, 7, len(dt_s)))
@@ -198,11 +198,11 @@ class CoordinatedTurn:
         return added
 
 
-def turn_factors(
+def turn_displacements_and_slopes(
     rate_rad_s: FloatArray, dt_s: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the displacement of a turn along and across the initial velocity, per unit of speed,
-    and both derivatives by turn rate.
+    """Return a turn's displacement along and across the initial velocity, per unit of speed, then
+    the derivatives of these two by turn rate.
     """
     turned = rate_rad_s * dt_s
     small = np.abs(turned) < _SMALL_TURN

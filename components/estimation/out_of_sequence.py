@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 from components.estimation.batched import (
     cholesky,
+    matrix_product,
     matrix_times_vector,
     multiply_by_transpose,
-    product,
     solve_lower,
     solve_lower_transposed,
-    symmetric,
+    symmetrised,
 )
 from components.estimation.carried_errors import MotionWithErrors
 from components.estimation.motion import Motion, predict
@@ -46,10 +46,10 @@ class Retrodiction:
     ) -> tuple[FloatArray, FloatArray]:
         """Return the present state and covariance after the past ones are corrected to these."""
         less = multiply_by_transpose(
-            product(self.gain, corrected_covariance - self.covariance), self.gain
+            matrix_product(self.gain, corrected_covariance - self.covariance), self.gain
         )
         moved = state + matrix_times_vector(self.gain, corrected - self.state)
-        return moved, symmetric(covariance + less)
+        return moved, symmetrised(covariance + less)
 
 
 def retrodict_between(
@@ -64,14 +64,14 @@ def retrodict_between(
     step, noise = model.jacobian(then, since_then_s), model.noise(since_then_s)
     ahead, spread_ahead = predict(model, then, spread, since_then_s)
     back = _transpose_times_inverse(
-        product(step, spread), spread_ahead
+        matrix_product(step, spread), spread_ahead
     )  # spread · stepᵀ / spread ahead
-    rest = -product(back, step)
+    rest = -matrix_product(back, step)
     for i in range(model.size):
         rest[i, i] += 1.0
-    total = multiply_by_transpose(product(rest, spread), rest)
-    total += multiply_by_transpose(product(back, noise + now[1]), back)
-    covariance = symmetric(total)
+    total = multiply_by_transpose(matrix_product(rest, spread), rest)
+    total += multiply_by_transpose(matrix_product(back, noise + now[1]), back)
+    covariance = symmetrised(total)
     across = multiply_by_transpose(back, now[1])  # of the state then with the state now
     return Retrodiction(
         then + matrix_times_vector(back, now[0] - ahead),
@@ -90,14 +90,14 @@ def retrodict_before_start(
     """
     state, spread = now
     step, noise = model.jacobian(state, -since_s), model.noise(since_s)
-    since = multiply_by_transpose(product(step, noise), step)
+    since = multiply_by_transpose(matrix_product(step, noise), step)
     if isinstance(model, MotionWithErrors):
         since[model.error_slice, model.error_slice] = noise[model.error_slice, model.error_slice]
-    covariance = symmetric(multiply_by_transpose(product(step, spread), step) + since)
+    covariance = symmetrised(multiply_by_transpose(matrix_product(step, spread), step) + since)
     return Retrodiction(
         model.move(state, -since_s),
         covariance,
-        _transpose_times_inverse(product(step, spread), covariance),
+        _transpose_times_inverse(matrix_product(step, spread), covariance),
     )
 
 

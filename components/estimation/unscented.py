@@ -13,7 +13,7 @@ from components.estimation.batched import (
     multiply_by_transpose,
     solve_lower,
     solve_lower_transposed,
-    symmetric,
+    symmetrised,
 )
 from components.estimation.carried_errors import ReportedErrors
 from components.estimation.estimator import Estimates, ExtendedKalmanFilter, SingleModelFilter
@@ -99,7 +99,7 @@ def predict_unscented(
     mean = _weighted_sum_of_points(moved, of_mean)
     apart = moved - mean[:, np.newaxis]
     spread = multiply_by_transpose(apart * of_covariance[:, np.newaxis], apart)
-    return mean, symmetric(spread + model.noise(dt_s))
+    return mean, symmetrised(spread + model.noise(dt_s))
 
 
 def unscented_moments(
@@ -143,8 +143,8 @@ def unscented_moments(
     rest = apart.copy()
     for k in range(size):
         rest -= slope[:, k, np.newaxis] * moved[k]
-    left_over = symmetric(multiply_by_transpose(rest * of_covariance[:, np.newaxis], rest))
-    return Moments(mean, symmetric(total), cross, slope, left_over)
+    left_over = symmetrised(multiply_by_transpose(rest * of_covariance[:, np.newaxis], rest))
+    return Moments(mean, symmetrised(total), cross, slope, left_over)
 
 
 def _weighted_sum_of_points(points: FloatArray, weights: FloatArray) -> FloatArray:

@@ -7,8 +7,8 @@ import numpy as np
 from components.display.picture_plane import (
     LINE,
     bearings_and_end_points,
-    estimated_positions,
-    held_positions,
+    estimated_rows_and_positions,
+    held_range_rows_and_positions,
 )
 from components.display.recorded_run import POSE, RecordedTables
 from components.estimation.frame import frame_change
@@ -19,8 +19,8 @@ from components.formats.asterix_records import (
     SERVICE,
     SYSTEM_TRACKS,
     AsterixRecord,
-    callsign,
-    write_records,
+    callsign_from_name,
+    encode_records,
 )
 from components.messages.columns import ORIGIN, VELOCITY
 from components.messages.state_tracks import COVARIANCE, covariance_matrices
@@ -39,7 +39,7 @@ _SAC = 0
 
 
 def asterix_bytes(run: RecordedTables) -> bytes:
-    """Return a run as ASTERIX; second 0 is midnight.
+    """Return a run as the bytes of an ASTERIX file; second 0 of the run is midnight.
 
     Radars and trackers are numbered by their names from SIC 1, in SAC 0; the ownship is SIC 0.
     What has no range is no plot and no track. Everything says that it is simulated.
@@ -54,19 +54,22 @@ def asterix_bytes(run: RecordedTables) -> bytes:
     )
     sic = {name: number for number, name in enumerate(blocks, start=1)}
     records = [
-        *_plots(run, sic), *_received_reports(run, sic), *_state_tracks(run, sic),
-        *_stub_track_records(run, sic), *_ownship_reports(run),
+        *_north_markers_and_plots(run, sic), *_position_report_records(run, sic),
+        *_estimated_track_records(run, sic),
+        *_stub_track_records(run, sic), *_ownship_truth_records(run),
     ]  # fmt: skip
     if not records:
         raise UsageError(
             f"{run.folder}: holds nothing that ASTERIX has a record for: detections or tracks with "
             "a range, or truth"
         )
-    return write_records(records)
+    return encode_records(records)
 
 
-def _plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Yield a north marker with the position of the radar for each of its scans, and its plots."""
+def _north_markers_and_plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+    """Yield for each radar scan a north marker with the radar's position, and a plot for each
+    detection with a measured range.
+    """
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
     lines = run.stack_columns("detections", LINE)
@@ -113,7 +116,7 @@ def _reported_position_mask(run: RecordedTables) -> BoolArray:
     return np.isfinite(run.numbers("detections", "reported_lat_deg"))
 
 
-def _received_reports(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+def _position_report_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Yield one record for each position that aircraft reported and that was received.
 
     Heights are pressure altitudes.
@@ -133,7 +136,7 @@ def _received_reports(run: RecordedTables, sic: dict[str, int]) -> Iterator[Aste
         sent.add(key)
         values = {
             "sac": _SAC, "sic": sic[key[0]], "number": key[1] % 2**24, "simulated": 1,
-            "name": callsign(targets[row] or ""), "lat_deg": say["lat_deg"],
+            "name": callsign_from_name(targets[row] or ""), "lat_deg": say["lat_deg"],
             "lon_deg": say["lon_deg"],
         }  # fmt: skip
         if np.isfinite(say["alt_m"]):
@@ -172,9 +175,9 @@ def _track_time_and_values(
     }  # fmt: skip
 
 
-def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
+def _estimated_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Yield estimated tracks, at the instants for which their states are valid."""
-    rows, positions = estimated_positions(run)
+    rows, positions = estimated_rows_and_positions(run)
     if len(rows) == 0:
         return
     origin = run.stack_columns("state_tracks", ORIGIN, rows)
@@ -207,7 +210,7 @@ def _state_tracks(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixR
 
 def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
     """Yield a system-track record (category 062) for each stub track's row, at measurement time."""
-    rows, positions = held_positions(run)
+    rows, positions = held_range_rows_and_positions(run)
     if len(rows) == 0:
         return
     names, blocks = run.texts("tracks", "target"), run.texts("tracks", "block")
@@ -216,11 +219,17 @@ def _stub_track_records(run: RecordedTables, sic: dict[str, int]) -> Iterator[As
     for k, row in enumerate(rows.tolist()):
         key = blocks[row] or "", names[row] or ""
         number.setdefault(key, len(number) + 1)
-        what = sic[key[0]], number[key], callsign(key[1]), float(measured_s[row]), positions[:, k]
+        what = (
+            sic[key[0]],
+            number[key],
+            callsign_from_name(key[1]),
+            float(measured_s[row]),
+            positions[:, k],
+        )
         yield AsterixRecord(SYSTEM_TRACKS, *_track_time_and_values(*what))
 
 
-def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
+def _ownship_truth_records(run: RecordedTables) -> Iterator[AsterixRecord]:
     """Yield the ownship's true flight as ADS-B records (category 021), one for each time."""
     if "truth" not in run.tables:
         return
@@ -234,6 +243,12 @@ def _ownship_reports(run: RecordedTables) -> Iterator[AsterixRecord]:
         "track_deg": np.degrees(np.arctan2(east, north)),
         "velocity_up_m_s": -own["velocity_down_m_s"],
     }  # fmt: skip
-    fixed = {"sac": _SAC, "sic": 0, "number": 1, "simulated": 1, "name": callsign(run.own_name)}
+    fixed = {
+        "sac": _SAC,
+        "sic": 0,
+        "number": 1,
+        "simulated": 1,
+        "name": callsign_from_name(run.own_name),
+    }
     for k, time_s in enumerate(own["time_s"].tolist()):
         yield AsterixRecord(ADS_B, time_s, fixed | {n: float(v[k]) for n, v in columns.items()})

@@ -43,7 +43,9 @@ def export_run(
         else folder.with_name(f"{folder.name}{_ENDINGS.get(to, f'.{to}')}")
     )
     if to == "csv":
-        _write_folder(tables, target if out is not None else folder.with_name(f"{folder.name}-csv"))
+        _write_table_files(
+            tables, target if out is not None else folder.with_name(f"{folder.name}-csv")
+        )
         return
     check_file_writable(target)
     said = ""
@@ -91,7 +93,7 @@ def _geoid_note_and_height_m(tables: RecordedTables, given_m: float | None) -> t
     return said, geoid_m
 
 
-def _write_folder(tables: RecordedTables, target: Path) -> None:
+def _write_table_files(tables: RecordedTables, target: Path) -> None:
     """Write one file for each table; all of them are made before the first is written."""
     if target.exists() and (not target.is_dir() or any(target.iterdir())):
         raise OutputError(f"--out {target}: is there already and not an empty folder")
@@ -143,7 +145,7 @@ def mat_bytes(run: RecordedTables) -> bytes:
                     f"{run.folder}: {table}.parquet: {name!r} cannot be the name of a table or a "
                     "column in MATLAB: a letter, then at most 62 letters, digits and underscores"
                 )
-    content = {name: _struct(table) for name, table in run.tables.items()}
+    content = {name: _matlab_struct(table) for name, table in run.tables.items()}
     stream = io.BytesIO()
     savemat(stream, content, long_field_names=True, oned_as="column")
     # Its head holds the hour at which it was written: the same run gives the same bytes.
@@ -151,7 +153,7 @@ def mat_bytes(run: RecordedTables) -> bytes:
     return head + stream.getvalue()[116:]
 
 
-def _struct(table: Any) -> dict[str, Any]:
+def _matlab_struct(table: Any) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for name in table.column_names:
         column = table[name]

@@ -8,7 +8,7 @@ import numpy as np
 
 from components.display.recorded_run import RecordedTables
 from components.flights.sampled_flight import SampledTrajectory
-from components.geometry import line_of_sight_ned, local_axes
+from components.geometry import east_north_up_axes, line_of_sight_ned
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
 
@@ -53,11 +53,11 @@ def xyz_text(run: RecordedTables, step_s: float = STEP_S) -> str:
     """
     own = next(iter(run.true_flights().values()))
     lat, lon = float(own["lat_deg"][0]), float(own["lon_deg"][0])
-    there = local_axes(np.array([lat]), np.array([lon]))
+    there = east_north_up_axes(np.array([lat]), np.array([lon]))
 
     def columns(flight: Mapping[str, FloatArray]) -> list[FloatArray]:
         position = flight["lat_deg"], flight["lon_deg"]
-        here = local_axes(*position)
+        here = east_north_up_axes(*position)
         # Altitudes stay what they are; east and north are those of the point of the tangent plane's
         # frame that lies so high above the plane, straight above or below the place.
         _, _, down = line_of_sight_ned(lat, lon, 0.0, *position, np.zeros_like(position[0]))

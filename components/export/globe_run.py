@@ -9,8 +9,8 @@ import numpy as np
 from components.display.picture_plane import (
     LINE,
     bearings_and_end_points,
-    estimated_positions,
-    held_positions,
+    estimated_rows_and_positions,
+    held_range_rows_and_positions,
 )
 from components.display.recorded_run import POSE, RecordedTables
 from components.display.symbols import LEVELS_ON_DARK, ON_DARK, block_marks
@@ -41,7 +41,9 @@ class Course:
     #: Of an alert, else 0.
     level: int = 0
 
-    def cut(self, start_s: float, end_s: float) -> tuple[FloatArray, FloatArray]:
+    def times_and_positions_between(
+        self, start_s: float, end_s: float
+    ) -> tuple[FloatArray, FloatArray]:
         """Return times (n,), positions (n, 3) from start to end, interpolated linearly at both."""
         start_s, end_s = (float(np.clip(t, *self.time_s[[0, -1]])) for t in (start_s, end_s))
         inside = (self.time_s > start_s) & (self.time_s < end_s)
@@ -106,7 +108,7 @@ def globe_run(run: RecordedTables) -> GlobeRun:
     alerts = [
         Course(
             f"{alert.name}: alert {level}", LEVELS_ON_DARK[min(level, 3) - 1],
-            *about.cut(start_s, stop_s), alert.block, level,
+            *about.times_and_positions_between(start_s, stop_s), alert.block, level,
         )
         for alert in alerts_of(run)
         if (about := _course_of_alert(alert, flights, tracks)) is not None
@@ -164,7 +166,7 @@ def detections_with_range(run: RecordedTables) -> Iterator[DetectedPlace]:
 
 def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
     """Yield the paths of all tracks confirmed at some time, without states marked as deleted."""
-    rows, positions = estimated_positions(run)
+    rows, positions = estimated_rows_and_positions(run)
     if len(rows) == 0:
         return
     status = np.array(run.texts("state_tracks", "track_status"), dtype=object)[rows]
@@ -182,7 +184,7 @@ def _estimated_courses(run: RecordedTables) -> Iterator[Course]:
 
 
 def _stub_track_courses(run: RecordedTables) -> Iterator[Course]:
-    rows, positions = held_positions(run)
+    rows, positions = held_range_rows_and_positions(run)
     blocks, targets = (
         (run.texts("tracks", name) for name in ("block", "target")) if len(rows) else ([], [])
     )

@@ -8,7 +8,7 @@ from components.display.symbols import LEVELS_ON_DARK
 from components.export.globe_run import Course, DetectedPlace, GlobeRun, globe_run, iso_time
 from dsa_des.arrays.types import FloatArray
 from dsa_des.errors import UsageError
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 #: Google's icons, which globes know by their addresses, for markers of figures.
 _ICON = "http://maps.google.com/mapfiles/kml/shapes/{}.png"
@@ -43,7 +43,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
         '<?xml version="1.0" encoding="UTF-8"?>',
         '<kml xmlns="http://www.opengis.net/kml/2.2" xmlns:gx="http://www.google.com/kml/ext/2.2">',
         "<Document>",
-        f"<name>{_xml(shown.name)}</name>",
+        f"<name>{_escaped_xml_text(shown.name)}</name>",
         f"<description>Heights above sea level: those of the run, above the WGS 84 ellipsoid, less "
         f"{geoid_m:g} m for the geoid. Second 0 is {iso_time(0.0)}.</description>",
         *_look_at_lines(shown, geoid_m),
@@ -91,7 +91,7 @@ def _styles(shown: GlobeRun) -> Iterator[str]:
 def _style(
     name: str, colour: str, icon: str, scale: float, width: float, named: float = 0.8
 ) -> Iterator[str]:
-    painted = _colour(colour)
+    painted = _kml_colour(colour)
     yield f'<Style id="{_xml_id(name)}">'
     yield (
         f"<IconStyle><color>{painted}</color><scale>{scale}</scale>"
@@ -102,7 +102,7 @@ def _style(
     yield "</Style>"
 
 
-def _colour(colour: str) -> str:
+def _kml_colour(colour: str) -> str:
     """Return a colour as KML has it: opacity, blue, green, red."""
     return f"ff{colour[5:7]}{colour[3:5]}{colour[1:3]}".lower()
 
@@ -115,7 +115,11 @@ def _xml_id(name: str) -> str:
 
 
 def _folder(name: str, content: Sequence[str]) -> list[str]:
-    return [f"<Folder><name>{_xml(name)}</name>", *content, "</Folder>"] if content else []
+    return (
+        [f"<Folder><name>{_escaped_xml_text(name)}</name>", *content, "</Folder>"]
+        if content
+        else []
+    )
 
 
 def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]:
@@ -126,7 +130,7 @@ def _courses(courses: Sequence[Course], style: str, geoid_m: float) -> list[str]
         else:
             of_one = f"level-{min(one.level, len(LEVELS_ON_DARK))}" if one.level else style
         lines += [
-            f"<Placemark><name>{_xml(one.name)}</name>",
+            f"<Placemark><name>{_escaped_xml_text(one.name)}</name>",
             f"<styleUrl>#{_xml_id(of_one)}</styleUrl><gx:Track>",
             "<altitudeMode>absolute</altitudeMode>",
             *(f"<when>{iso_time(t)}</when>" for t in one.time_s.tolist()),
@@ -146,7 +150,7 @@ def _points(seen: Sequence[DetectedPlace], geoid_m: float) -> list[str]:
     for one in seen:
         lon, lat, alt = one.position
         lines += [
-            f"<Placemark><name>{_xml(one.name)}</name>",
+            f"<Placemark><name>{_escaped_xml_text(one.name)}</name>",
             f"<TimeStamp><when>{iso_time(one.time_s)}</when></TimeStamp>",
             f"<styleUrl>#{_xml_id(f'sensor-{one.sensor}')}</styleUrl><Point>",
             f"<altitudeMode>absolute</altitudeMode>"
@@ -156,5 +160,5 @@ def _points(seen: Sequence[DetectedPlace], geoid_m: float) -> list[str]:
     return lines
 
 
-def _xml(text: str) -> str:
-    return escape(printable(text))
+def _escaped_xml_text(text: str) -> str:
+    return escape(escape_unprintable(text))

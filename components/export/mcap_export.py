@@ -91,7 +91,7 @@ def mcap_bytes(run: RecordedTables) -> bytes:
         return channels[topic]
 
     messages: list[tuple[int, int, int, bytes]] = []
-    for topic, name, schema, at_ns, content in (*_tables(run), *_scene_messages(run)):
+    for topic, name, schema, at_ns, content in (*_table_messages(run), *_scene_messages(run)):
         data = json.dumps(content, ensure_ascii=False, allow_nan=False).encode()
         messages.append((at_ns, channel(topic, name, schema), len(messages), data))
     messages.sort(key=lambda one: one[:3])
@@ -105,7 +105,7 @@ def mcap_bytes(run: RecordedTables) -> bytes:
 _Message = tuple[str, str, dict[str, Any], int, dict[str, Any]]
 
 
-def _tables(run: RecordedTables) -> Iterator[_Message]:
+def _table_messages(run: RecordedTables) -> Iterator[_Message]:
     for name, table in sorted(run.tables.items()):
         if "time_s" not in table.column_names:
             continue
@@ -169,7 +169,7 @@ def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
     origin = origin or (float(lat[0]), float(lon[0]), float(alt[0]))
     marks = marks_of_blocks(run, {end.sensor for end in ends})
     for number, (end, offset) in enumerate(zip(ends, _offsets(origin, lat, lon, alt), strict=True)):
-        ball = _detection_sphere(number, end, offset, marks[end.sensor].colour)
+        ball = _detection_time_and_sphere(number, end, offset, marks[end.sensor].colour)
         yield _message("/detections", "foxglove.SceneUpdate", *ball)
 
 
@@ -177,7 +177,7 @@ def _message(topic: str, name: str, at_ns: int, content: dict[str, Any]) -> _Mes
     return topic, name, _FOXGLOVE[name], at_ns, content
 
 
-def _detection_sphere(
+def _detection_time_and_sphere(
     number: int, end: DetectedPlace, offset: dict[str, float], painted: str
 ) -> tuple[int, dict[str, Any]]:
     when = _unix_time_ns(end.time_s)

@@ -16,7 +16,7 @@ from stonesoup.types.groundtruth import GroundTruthPath, GroundTruthState
 
 from components.display.recorded_run import POSE, RecordedTables
 from components.estimation.frame import pose_in_frame, vectors_in_frame
-from components.geometry import north_east_up
+from components.geometry import north_east_up_offsets_m
 from components.messages.columns import ORIGIN
 from components.stone_soup.objects import (
     POSITION,
@@ -150,7 +150,9 @@ def _detection_columns(run: RecordedTables) -> dict[str, Any]:
 def _ownship_poses(
     run: RecordedTables, columns: Mapping[str, Any], flights: Mapping[str, Any]
 ) -> FloatArray:
-    """Return the ownship's pose at each detection, (6, n): the recorded belief, else the truth."""
+    """Return the ownship's pose at each detection, (6, n): as its navigation gave it, where
+    recorded, else the true one.
+    """
     pose = np.stack([columns[name] for name in POSE])
     unknown = np.isnan(pose).any(axis=0)
     if not unknown.any():
@@ -211,7 +213,7 @@ def _detections_by_scan(
 def _path(name: str, flight: Mapping[str, FloatArray], origin: Origin) -> GroundTruthPath:
     position = [np.ascontiguousarray(flight[key]) for key in _PLACE]
     here = [np.full(len(position[0]), value) for value in origin]
-    north, east, up = north_east_up(*here, *position)
+    north, east, up = north_east_up_offsets_m(*here, *position)
     states = state_vectors(np.stack([north, east, -up]), _velocity_in_frame(flight, position, here))
     return GroundTruthPath(
         [

@@ -11,7 +11,7 @@ import numpy as np
 
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.fleet import CELLS_AT_ONCE
-from components.geometry import Vector, local_axes, radii_of_curvature, wrap_heading_rad
+from components.geometry import Vector, east_north_up_axes, radii_of_curvature, wrap_heading_rad
 from dsa_des.arrays.types import FloatArray
 
 WINDOW_S = 4.0
@@ -32,7 +32,7 @@ _EDGE_S = 1e-6
 _POOREST_CONDITION = 1e-3
 
 
-def fit_path(
+def fit_velocity_and_acceleration(
     time_s: FloatArray,
     lat_deg: FloatArray,
     lon_deg: FloatArray,
@@ -49,7 +49,7 @@ def fit_path(
     line is fitted. Of a block of a path, `offsets` are those of the whole
     (`overlapping_path_blocks`).
     """
-    east, north, up = local_axes(lat_deg, lon_deg)
+    east, north, up = east_north_up_axes(lat_deg, lon_deg)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
 
     def displacement(i: slice, j: slice) -> Vector:
@@ -70,10 +70,10 @@ def overlapping_path_blocks(
     time_s: FloatArray,
 ) -> Iterator[tuple[slice, slice, slice, Sequence[int]]]:
     """Yield blocks of a path as (slice with neighbours, the block within that slice, the block
-    within the path, offsets for `fit_path`).
+    within the path, offsets for `fit_velocity_and_acceleration`).
 
     Each is a block with its neighbours on either side, which rows of that are its own, which these
-    are of the path, and the offsets of `fit_path`.
+    are of the path, and the offsets of `fit_velocity_and_acceleration`.
     """
     offsets = _neighbour_offsets(time_s, WINDOW_S)
     reach, count = offsets[-1], len(time_s)
@@ -114,7 +114,9 @@ def attitude_from_path(
     for part, inner, rows, offsets in overlapping_path_blocks(time_s):
         times, lat, lon = time_s[part], lat_deg[part], lon_deg[part]
         if velocity_enu_mps is None:
-            velocity, acceleration = fit_path(times, lat, lon, alt_m[part], offsets=offsets)
+            velocity, acceleration = fit_velocity_and_acceleration(
+                times, lat, lon, alt_m[part], offsets=offsets
+            )
         else:
             east, north, up = (along[part] for along in velocity_enu_mps)
             velocity = east, north, up
@@ -130,7 +132,7 @@ def attitude_from_path(
         climb = np.arctan2(v_up, np.where(moves, speed, 1.0))
         pitch[rows] = np.where(moves, climb, 0.0)[inner]
         roll[rows] = np.where(moves, np.arctan2(across, STANDARD_GRAVITY_M_S2), 0.0)[inner]
-    return _hold_yaw(yaw, moving), pitch, roll
+    return _fill_yaw_where_still(yaw, moving), pitch, roll
 
 
 def _fit_acceleration(
@@ -140,7 +142,7 @@ def _fit_acceleration(
     """Return accelerations (m/s²): slopes of straight lines fitted to the velocities around each
     sample, in its own local frame.
     """
-    east, north, _ = local_axes(lat_deg, lon_deg)
+    east, north, _ = east_north_up_axes(lat_deg, lon_deg)
     x, y, z = (velocity[0] * e + velocity[1] * n for e, n in zip(east, north, strict=True))
     v_up = velocity[2]
 
@@ -189,7 +191,9 @@ def _fit_derivatives(
                 power = power * (tau / half)
     m0, m1, m2, m3, m4 = moments
     spread = m0 * m2 - m1 * m1
-    straight = [_ratio(m0 * s1 - m1 * s0, spread) for s0, s1 in zip(sums[0], sums[1], strict=True)]
+    straight = [
+        _ratio_or_zero(m0 * s1 - m1 * s0, spread) for s0, s1 in zip(sums[0], sums[1], strict=True)
+    ]
     zero = np.zeros(shape)
     if degree == 1:
         first, second = straight, [zero, zero, zero]
@@ -200,8 +204,8 @@ def _fit_derivatives(
         for s0, s1, s2, line in zip(*sums, straight, strict=True):
             slope = -s0 * (m1 * m4 - m2 * m3) + s1 * (m0 * m4 - m2 * m2) - s2 * (m0 * m3 - m1 * m2)
             bend = s0 * (m1 * m3 - m2 * m2) - s1 * (m0 * m3 - m1 * m2) + s2 * spread
-            first.append(np.where(curved, _ratio(slope, det), line))
-            second.append(np.where(curved, 2.0 * _ratio(bend, det), 0.0))
+            first.append(np.where(curved, _ratio_or_zero(slope, det), line))
+            second.append(np.where(curved, 2.0 * _ratio_or_zero(bend, det), 0.0))
     return (
         (first[0] / half, first[1] / half, first[2] / half),
         (second[0] / half**2, second[1] / half**2, second[2] / half**2),
@@ -212,15 +216,15 @@ def _dot(a: Vector, j: slice, b: Vector, i: slice) -> FloatArray:
     return a[0][j] * b[0][i] + a[1][j] * b[1][i] + a[2][j] * b[2][i]
 
 
-def _ratio(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
+def _ratio_or_zero(numerator: FloatArray, denominator: FloatArray) -> FloatArray:
     """Return numerator / denominator, and 0 where the denominator is not above 0."""
     usable = denominator > 0.0
     return np.where(usable, numerator / np.where(usable, denominator, 1.0), 0.0)
 
 
-def _hold_yaw(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
-    """Return yaws in which samples that do not move have the yaw of the last moving sample before,
-    or else of the first moving one.
+def _fill_yaw_where_still(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
+    """Return yaws where samples that do not move take that of the last moving sample before, or
+    else of the first moving one.
     """
     if moving.all():
         return yaw

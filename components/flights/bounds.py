@@ -88,7 +88,7 @@ def traffic_envelope(own: Any, fleet: Fleet, duration_s: float, reach_m: float) 
     )
     apart = moves + own_moves
     near = range_m - apart <= REACH_MARGIN * reach_m
-    latitudes, alt, turns = _position_bounds(own_state, own_moves)
+    latitudes, alt, turns = _latitude_and_altitude_bounds(own_state, own_moves)
     pitch, roll = attitude_extremes_rad(own)
     place = own_state.lat_deg, own_state.lon_deg, own_state.alt_m
     path = OwnPath(times, place, float(own_moves), half_s)
@@ -122,7 +122,9 @@ def max_true_ranges_m(
         times, half_s = _midpoints_and_half_step_s(duration_s, targets)
         for run, speed_mps in enumerate(own.max_speeds_mps.tolist()):
             state = own.each(np.full(len(times), run), times)
-            latitudes, alt, _ = _position_bounds(state, _max_distance_m(speed_mps, half_s))
+            latitudes, alt, _ = _latitude_and_altitude_bounds(
+                state, _max_distance_m(speed_mps, half_s)
+            )
             true_m = [max_true_range_m(earth, m, latitudes, alt) for earth, m in look.seeming]
             reaches_m[run] = max(look.range_m, *true_m)
     return reaches_m
@@ -137,7 +139,9 @@ def _midpoints_and_half_step_s(duration_s: float, targets: int) -> tuple[FloatAr
     return times, half_s
 
 
-def _position_bounds(state: TrajectoryState, moves_m: float) -> tuple[Interval, Interval, float]:
+def _latitude_and_altitude_bounds(
+    state: TrajectoryState, moves_m: float
+) -> tuple[Interval, Interval, float]:
     """Return the intervals of latitude (deg) and altitude (m) within ``moves_m`` of the ownship's
     samples, and that distance as an angle (rad).
     """
@@ -171,14 +175,16 @@ def _max_distance_m(speed_mps: Any, half_s: float) -> Any:
     return _SPEED_MARGIN * speed_mps * half_s + _POSITION_MARGIN_M
 
 
-def _states_each_second(own_at: FlightAt, duration_s: float) -> tuple[FloatArray, TrajectoryState]:
+def _times_and_states_each_second(
+    own_at: FlightAt, duration_s: float
+) -> tuple[FloatArray, TrajectoryState]:
     times = np.linspace(0.0, duration_s, min(math.ceil(duration_s), _MOST_SAMPLES) + 1)
     return times, own_at(times)
 
 
 def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -> None:
     """Raise ValueError if the ownship is not above the terrain, checked at each second."""
-    times, state = _states_each_second(own_at, duration_s)
+    times, state = _times_and_states_each_second(own_at, duration_s)
     hit = np.flatnonzero((state.alt_m <= terrain_m) & state.present)
     if len(hit):
         first = hit[0]
@@ -188,11 +194,11 @@ def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -
         )
 
 
-def check_on_raster(
+def check_above_raster_ground(
     own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
     """Raise ValueError if the ownship never is over the raster, or is once not above its ground."""
-    times, state = _states_each_second(own_at, duration_s)
+    times, state = _times_and_states_each_second(own_at, duration_s)
     there = np.flatnonzero(state.present)
     ground, inside = raster.heights_and_coverage(state.lat_deg[there], state.lon_deg[there])
     if len(there) and not inside.any():

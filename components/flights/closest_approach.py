@@ -32,7 +32,7 @@ def regular_times_s(step_s: float, number: IntArray) -> FloatArray:
 
 
 def regular_count(step_s: float, duration_s: float) -> int:
-    """Return how many points 0, step, 2 step, ... lie within a duration."""
+    """Return how many of the times 0, step, 2 step, ... lie in [0, ``duration_s``]."""
     return int(duration_s / step_s) + 1
 
 
@@ -42,7 +42,7 @@ class SampleTimes(Protocol):
     def time_of(self, target: IntArray, number: IntArray) -> FloatArray:
         """Return for each target the time (s) of its sample with the given number, shape (n,)."""
 
-    def numbers_between(
+    def first_and_last_sample_numbers(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return each target's first and last sample number in [first_s, last_s], both (n,).
@@ -62,7 +62,7 @@ class RegularTimes:
         """Return for each target the time (s) of its sample with the given number, shape (n,)."""
         return regular_times_s(self.step_s, number)
 
-    def numbers_between(
+    def first_and_last_sample_numbers(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return each target's first and last sample number in [first_s, last_s], both (n,)."""
@@ -89,7 +89,7 @@ class KnownTimes:
         """Return for each target the time (s) of its sample with the given number, shape (n,)."""
         return self._find.starts_s[self._find.first[target * self._of_each] + number]
 
-    def numbers_between(
+    def first_and_last_sample_numbers(
         self, target: IntArray, first_s: FloatArray, last_s: FloatArray
     ) -> tuple[IntArray, IntArray]:
         """Return each target's first and last sample number in [first_s, last_s], both (n,)."""
@@ -142,7 +142,7 @@ def closest_approaches(
     closing = closing_speed_mps * _SPEED_MARGIN
     best = Approaches.unknown(len(closing)) if best is None else best
     target = np.arange(len(closing))
-    first, last = times.numbers_between(target, *present_s)
+    first, last = times.first_and_last_sample_numbers(target, *present_s)
     some = first <= last
     waiting = [(target[some], first[some], last[some])]
     while waiting:
@@ -152,8 +152,10 @@ def closest_approaches(
             target, first, last = (a[:MOST_AT_ONCE] for a in (target, first, last))
         middle = (first + last) // 2
         time_s = times.time_of(target, middle)
-        range_m, there = _ranges_and_presence(own_at(target, time_s), targets_at(target, time_s))
-        _improve(best, target[there], time_s[there], range_m[there])
+        range_m, there = _ranges_and_both_present(
+            own_at(target, time_s), targets_at(target, time_s)
+        )
+        _update_where_closer(best, target[there], time_s[there], range_m[there])
         away_s = np.maximum(
             time_s - times.time_of(target, first), times.time_of(target, last) - time_s
         )
@@ -201,7 +203,7 @@ def refine_between_samples(
             np.minimum(middle + reach, present_s[1][target]),
         )
         before, after = (
-            _ranges_and_presence(own_at(target, t), targets_at(target, t))[0] for t in ends
+            _ranges_and_both_present(own_at(target, t), targets_at(target, t))[0] for t in ends
         )
         square = best.range_m[target] ** 2
         with np.errstate(invalid="ignore", divide="ignore"):
@@ -212,12 +214,12 @@ def refine_between_samples(
         some = np.flatnonzero(np.isfinite(vertex) & (bend > 0.0))
         time_s = np.round(np.clip(vertex, *ends)[some], _DIGITS)
         here = target[some]
-        range_m, there = _ranges_and_presence(own_at(here, time_s), targets_at(here, time_s))
+        range_m, there = _ranges_and_both_present(own_at(here, time_s), targets_at(here, time_s))
         nearer = there & (range_m < best.range_m[here] - _NEARER_M)
         best.range_m[here[nearer]], best.time_s[here[nearer]] = range_m[nearer], time_s[nearer]
 
 
-def _ranges_and_presence(own: Any, other: Any) -> tuple[FloatArray, Any]:
+def _ranges_and_both_present(own: Any, other: Any) -> tuple[FloatArray, Any]:
     """Return the slant ranges (m) between two states, and a mask, True if both are present."""
     range_m = slant_range_m(
         own.lat_deg, own.lon_deg, own.alt_m, other.lat_deg, other.lon_deg, other.alt_m
@@ -225,7 +227,9 @@ def _ranges_and_presence(own: Any, other: Any) -> tuple[FloatArray, Any]:
     return range_m, own.present & other.present
 
 
-def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: FloatArray) -> None:
+def _update_where_closer(
+    best: Approaches, target: IntArray, time_s: FloatArray, range_m: FloatArray
+) -> None:
     """Update ``best`` in place where a new range is smaller, or as small and earlier."""
     maybe = range_m <= best.range_m[target]
     target, time_s, range_m = target[maybe], time_s[maybe], range_m[maybe]
@@ -239,23 +243,27 @@ def _improve(best: Approaches, target: IntArray, time_s: FloatArray, range_m: Fl
     best.time_s[target[one]] = time_s[one]
 
 
-def censoring_ends(
+def describe_censoring_ends(
     own: Trajectory,
     targets: Fleet,
     compared_at: Sequence[SampleTimes],
     time_s: FloatArray,
     end_s: float,
 ) -> list[str]:
-    """Return in words at which end of the times each closest approach lies; empty if at neither."""
-    present_s = np.array(present_together_s(own, targets.intervals_present_s, end_s))
+    """Return for each target, in words, which end of the times its closest approach is at, or
+    nothing.
+    """
+    present_s = np.array(common_presence_bounds_s(own, targets.intervals_present_s, end_s))
     looked_s = np.array(_sample_span_s(compared_at, *present_s))
     return [
-        censoring_end(time, looked_s[:, number], present_s[:, number], end_s)
+        describe_censoring_end(time, looked_s[:, number], present_s[:, number], end_s)
         for number, time in enumerate(time_s.tolist())
     ]
 
 
-def censoring_end(time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float) -> str:
+def describe_censoring_end(
+    time_s: float, looked_s: FloatArray, present_s: FloatArray, end_s: float
+) -> str:
     """Return in words at which end of the times a closest approach lies; empty if at neither."""
     if time_s <= looked_s[0]:
         return "the start of its flight" if present_s[0] > 0.0 else "the start"
@@ -264,7 +272,7 @@ def censoring_end(time_s: float, looked_s: FloatArray, present_s: FloatArray, en
     return ""
 
 
-def present_together_s(
+def common_presence_bounds_s(
     own: Any, intervals_s: FloatArray, end_s: float
 ) -> tuple[FloatArray, FloatArray]:
     """Return the first and last time (s) at which each target and the ownship may be present."""
@@ -282,7 +290,7 @@ def _sample_span_s(
     first, last = np.full(len(begin_s), np.nan), np.full(len(begin_s), np.nan)
     for times in compared_at:
         targets = np.arange(len(begin_s))
-        low, high = times.numbers_between(targets, begin_s, end_s)
+        low, high = times.first_and_last_sample_numbers(targets, begin_s, end_s)
         some = np.flatnonzero(high >= low)
         first[some] = np.fmin(first[some], times.time_of(some, low[some]))
         last[some] = np.fmax(last[some], times.time_of(some, high[some]))
@@ -294,7 +302,7 @@ def approaches_of_run(
 ) -> Approaches:
     """Return closest approaches at the sample times and, with ``between``, between them."""
     best, speeds = Approaches.unknown(len(targets)), targets.max_speeds_mps
-    present_s = present_together_s(own, targets.intervals_present_s, end_s)
+    present_s = common_presence_bounds_s(own, targets.intervals_present_s, end_s)
     flights = (lambda _, time_s: own.at(time_s)), targets.each
     for some in times:
         closest_approaches(

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.flights.geodesic_motion import geodesic_parameters, geodesic_state
-from components.geometry import enu_to_geodetic, line_of_sight_ned, local_axes
+from components.flights.geodesic_motion import geodesic_parameters, position_and_yaw_on_geodesic
+from components.geometry import east_north_up_axes, enu_to_geodetic, line_of_sight_ned
 from dsa_des.arrays.types import BoolArray, FloatArray
 
 #: In which sense the aircraft are closest: by the slant range, or by the horizontal distance.
@@ -39,7 +39,7 @@ class Approach:
     sense: str = "slant"
 
 
-def intruder_headings(
+def both_intruder_headings_rad(
     own_heading_rad: FloatArray,
     own_speed: FloatArray,
     intruder_speed: FloatArray,
@@ -89,7 +89,7 @@ def solve_intruder_positions(
     angle = np.arctan2(east, north) + side * off
     for _ in range(_ROUNDS):
         lat, lon, altitude = _intruder_positions_at_angle(a, angle)
-        value = _range_times_rate(a, lat, lon, altitude)
+        value = _relative_position_dot_velocity(a, lat, lon, altitude)
         # The derivative in the plane: Newton on the angle converges at once.
         slope = distance * (east * np.cos(angle) - north * np.sin(angle))
         step = np.where(possible & (np.abs(slope) > 0.0), value / np.where(slope, slope, 1.0), 0.0)
@@ -113,7 +113,7 @@ def _intruder_positions_at_angle(
     return lat, lon, altitude
 
 
-def _range_times_rate(
+def _relative_position_dot_velocity(
     a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray
 ) -> FloatArray:
     """Return the dot product of relative position and relative velocity, of their horizontal parts
@@ -121,7 +121,7 @@ def _range_times_rate(
     """
     own_lat, own_lon = np.full_like(lat, a.lat_deg), np.full_like(lat, a.lon_deg)
     n, e, d = line_of_sight_ned(own_lat, own_lon, a.altitude_m[0], lat, lon, altitude)
-    own, other = local_axes(own_lat, own_lon), local_axes(lat, lon)
+    own, other = east_north_up_axes(own_lat, own_lon), east_north_up_axes(lat, lon)
     relative = np.zeros((3, len(lat)))
     for k, axes, sign in ((0, own, -1.0), (1, other, 1.0)):
         parts = (
@@ -155,7 +155,9 @@ def fly_paths(
             at_lat, at_lon, at_alt, a.heading_rad[k], a.speed_mps[k], a.climb_mps[k]
         )
         elapsed = time_s[np.newaxis] - closest_s[:, np.newaxis]
-        state = geodesic_state(np.repeat(table, len(time_s), axis=1), elapsed.reshape(-1))
+        state = position_and_yaw_on_geodesic(
+            np.repeat(table, len(time_s), axis=1), elapsed.reshape(-1)
+        )
         paths.append([values.reshape(elapsed.shape) for values in state[:3]])
     lats, lons, alts = (np.array(values) for values in zip(*paths, strict=True))
     return lats, lons, alts, possible

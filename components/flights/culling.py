@@ -37,7 +37,7 @@ class NearIntervals:
     end_s: FloatArray
 
     def may_be_near(self, columns: IntArray, time_s: FloatArray, lasts_s: float) -> BoolArray:
-        """Return a mask (rows, targets), True if possibly near in the look from the row's time.
+        """Return a mask (rows, targets), True if maybe near within ``lasts_s`` of the row's time.
 
         `columns` are those of `targets_near` all of these looks: which of them are near at which
         one does not depend on the window.
@@ -63,7 +63,9 @@ class NearIntervals:
         met = (self.start_s <= last_s) & (self.end_s >= first_s)
         return np.unique(self.target[met])
 
-    def holds(self, target: IntArray, time_s: FloatArray, until_s: FloatArray) -> BoolArray:
+    def may_be_near_throughout(
+        self, target: IntArray, time_s: FloatArray, until_s: FloatArray
+    ) -> BoolArray:
         """Return a mask (n,), True if a target may be near from its ``time_s`` to ``until_s``."""
         first = np.searchsorted(self.target, target)
         count = np.searchsorted(self.target, target, side="right") - first
@@ -74,7 +76,7 @@ class NearIntervals:
             inside[rest] |= (self.start_s[one] <= until_s[rest]) & (time_s[rest] <= self.end_s[one])
         return inside
 
-    def most_at_once(self) -> int:
+    def max_near_targets_at_once(self) -> int:
         """Return the largest number of targets that may be near at one time."""
         times = np.concatenate([self.start_s, self.end_s])
         change = np.repeat([1, -1], len(self.target))
@@ -114,7 +116,7 @@ def near_intervals(
         drift = closing[target] * half + _RANGE_MARGIN_M
         there = (present_s[0][target] <= start + length) & (present_s[1][target] >= start)
         maybe = there & (range_m <= within_m[target] + drift)
-        fine = length <= FINEST_S or _has_too_many(run[target], of_run)
+        fine = length <= FINEST_S or _run_has_too_many_pieces(run[target], of_run)
         settled = maybe & ((range_m <= within_m[target] - drift) | fine)
         kept.append((target[settled], start[settled], start[settled] + length))
         cut = maybe & ~settled
@@ -127,7 +129,7 @@ def near_intervals(
     return _merge_intervals(near[some], start[some], end[some])
 
 
-def _has_too_many(run: IntArray, of_run: int) -> BoolArray:
+def _run_has_too_many_pieces(run: IntArray, of_run: int) -> BoolArray:
     """Return a mask over pieces of time, True where the run has more pieces than the limit."""
     too_many: BoolArray = 2 * np.bincount(run) > _MOST_PIECES_PER_TARGET * of_run
     return too_many[run]
@@ -184,12 +186,12 @@ class SteeredCulling:
             (targets_mps + own_mps[:, np.newaxis] * _OWN_SPEED_MARGIN) * _SPEED_MARGIN
         )
 
-    def forget(self, run: int, time_s: float) -> None:
+    def forget_ranges_from(self, run: int, time_s: float) -> None:
         """Discard a run's stored ranges from the time from which its ownship is steered."""
         known = self._known[0, run]
         known[known * self.epoch_s[run] >= time_s] = -1
 
-    def states_and_near(
+    def own_states_and_near_mask(
         self, own: SteeredFleet, run: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, BoolArray]:
         """Return the ownships' states at each row with the steering so far, and a mask (rows,
@@ -211,7 +213,9 @@ class SteeredCulling:
         here = own.each(np.concatenate([run, begun]), np.concatenate([time_s, start_s])).arrays()
         if len(new):
             at_start = (values[rows:, np.newaxis] for values in here[:3])
-            range_m[new] = slant_range_m(*at_start, *self._epoch_positions(begun, number[new]))
+            range_m[new] = slant_range_m(
+                *at_start, *self._target_positions_at_epoch(begun, number[new])
+            )
             self._known[0, begun, index[new]] = number[new]
             self._range_m[begun, index[new]] = range_m[new]
         closing = self._closing_speed_bounds_mps(self._targets_mps[of], fastest[first])
@@ -219,7 +223,7 @@ class SteeredCulling:
         near = np.asarray((range_m <= within_m)[np.cumsum(begins) - 1])
         return TrajectoryState(*(values[:rows] for values in here)), near
 
-    def _epoch_positions(self, run: IntArray, epoch: IntArray) -> FloatArray:
+    def _target_positions_at_epoch(self, run: IntArray, epoch: IntArray) -> FloatArray:
         """Return the positions (3, n, targets) of each run's targets at the start of its epoch,
         computing what is not stored yet.
         """

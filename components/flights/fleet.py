@@ -66,7 +66,7 @@ class Fleet(Sequence[Any]):
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Return the states of all flights at the given times, shape (times, flights)."""
-        times, count = check_times(time_s), len(self)
+        times, count = checked_one_axis_times(time_s), len(self)
         aircraft = np.tile(np.arange(count), len(times))
         return self.each(aircraft, np.repeat(times, count)).reshape((len(times), count))
 
@@ -88,12 +88,12 @@ def evaluate_in_blocks(
     if len(blocks) == 1:
         return blocks[0]
     if not blocks:
-        return empty_state(1, 0).reshape((0,))
+        return uninitialized_state(1, 0).reshape((0,))
     columns = zip(*(block.arrays() for block in blocks), strict=True)
     return TrajectoryState(*(np.concatenate(parts) for parts in columns))
 
 
-def check_times(time_s: npt.ArrayLike) -> FloatArray:
+def checked_one_axis_times(time_s: npt.ArrayLike) -> FloatArray:
     """Return times as a float array; ValueError if it does not have exactly one axis."""
     times = np.asarray(time_s, dtype=np.float64, order="C")
     if times.ndim != 1:
@@ -101,7 +101,7 @@ def check_times(time_s: npt.ArrayLike) -> FloatArray:
     return times
 
 
-def empty_state(rows: int, columns: int) -> TrajectoryState:
+def uninitialized_state(rows: int, columns: int) -> TrajectoryState:
     """Return a state of uninitialized arrays of shape (rows, columns), to be filled."""
     shape = (rows, columns)
     lat, lon, alt, yaw, pitch, roll = (np.empty(shape) for _ in range(6))
@@ -111,7 +111,7 @@ def empty_state(rows: int, columns: int) -> TrajectoryState:
 def assemble_rows(rows: Sequence[IntArray], states: Sequence[TrajectoryState]) -> TrajectoryState:
     """Return the states of all parts as one, each part's states at the rows given for it."""
     if not states:
-        return empty_state(1, 0).reshape((0,))
+        return uninitialized_state(1, 0).reshape((0,))
     order = np.argsort(np.concatenate(rows), kind="stable")
     columns = zip(*(state.arrays() for state in states), strict=True)
     return TrajectoryState(*(np.concatenate(parts)[order] for parts in columns))
@@ -219,7 +219,9 @@ class MixedFleet(Fleet):
     def __getitem__(self, index: int) -> Any:  # type: ignore[override]
         return self._flights[index]
 
-    def _split_by_fleet(self, aircraft: IntArray) -> list[tuple[Fleet, IntArray, IntArray]]:
+    def _fleets_with_rows_and_flights(
+        self, aircraft: IntArray
+    ) -> list[tuple[Fleet, IntArray, IntArray]]:
         """Return for each fleet concerned: itself, the asking rows, and its flights' indices."""
         fleet = self._fleet[aircraft]
         asked = np.flatnonzero(np.bincount(fleet, minlength=1)).tolist()
@@ -231,21 +233,21 @@ class MixedFleet(Fleet):
 
     def each(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
         """Return the states (n,) of the given flights, each at its own time (s)."""
-        parts = self._split_by_fleet(aircraft)
+        parts = self._fleets_with_rows_and_flights(aircraft)
         states = [fleet.each(index, time_s[row]) for fleet, row, index in parts]
         return assemble_rows([row for _, row, _ in parts], states)
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return flights' ground speeds (m/s), each at its own time; NaN if no script sets it."""
         speed_mps = super().ground_speeds_mps(aircraft, time_s)
-        for fleet, row, index in self._split_by_fleet(aircraft):
+        for fleet, row, index in self._fleets_with_rows_and_flights(aircraft):
             speed_mps[row] = fleet.ground_speeds_mps(index, time_s[row])
         return speed_mps
 
     def fixed_attitudes_rad(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return flights' fixed yaw, pitch, roll (3, n), each at its time; NaN where not fixed."""
         fixed_rad = super().fixed_attitudes_rad(aircraft, time_s)
-        for fleet, row, index in self._split_by_fleet(aircraft):
+        for fleet, row, index in self._fleets_with_rows_and_flights(aircraft):
             fixed_rad[:, row] = fleet.fixed_attitudes_rad(index, time_s[row])
         return fixed_rad
 

@@ -110,7 +110,7 @@ def _angle_from_node(y: float, x: float, sin_beta: float, cos_az: float) -> floa
     return math.atan2(y, x) if sin_beta or cos_az else 0.0
 
 
-def power(base: Any, exponent: int) -> Any:
+def power_rounded_as_python(base: Any, exponent: int) -> Any:
     """Return numbers to an integer power, rounded as Python does and NumPy does not."""
     return apply_elementwise(lambda value: value**exponent, base)
 
@@ -135,7 +135,7 @@ def leg_radius_m(parameters: FloatArray) -> float:
     return float(parameters[_RADIUS])
 
 
-def geodesic_state(
+def position_and_yaw_on_geodesic(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return latitude, longitude (deg), altitude (m), yaw (rad) on straight legs at times (s)."""
@@ -230,7 +230,7 @@ def _sine_series(
 
 
 def _distance_series(eps: Any) -> tuple[Any, list[Any], list[Any]]:
-    """A1, C1 and C1' of Karney (2013), eqs 17, 18 and 21."""
+    """Return A1 and the lists C1 and C1' of Karney (2013), eqs 17, 18, 21, at epsilon ``eps``."""
     e2 = eps * eps
     a1 = (1.0 + e2 * (1 / 4 + e2 * (1 / 64 + e2 / 256))) / (1.0 - eps)
     c1 = [
@@ -251,7 +251,7 @@ def _distance_series(eps: Any) -> tuple[Any, list[Any], list[Any]]:
 
 
 def _longitude_series(eps: Any, n: float) -> tuple[Any, list[Any]]:
-    """A3 and C3 of Karney (2013), eqs 24 and 25."""
+    """Return A3 and the list C3 of Karney (2013), eqs 24 and 25, by epsilon and flattening."""
     a3 = 1.0 - eps * (
         1 / 2
         - n / 2
@@ -274,13 +274,13 @@ def _longitude_series(eps: Any, n: float) -> tuple[Any, list[Any]]:
                 + eps * (3 / 64 + n * (3 / 64 - n / 64) + eps * (5 / 128 + n / 64 + eps * 3 / 128))
             )
         ),
-        power(eps, 2)
+        power_rounded_as_python(eps, 2)
         * (
             1 / 16
             - n * (3 / 32 - n / 32)
             + eps * (3 / 64 - n * (1 / 32 + n * 3 / 64) + eps * (3 / 128 + n / 128 + eps * 5 / 256))
         ),
-        power(eps, 3)
+        power_rounded_as_python(eps, 3)
         * (5 / 192 - n * (3 / 64 - n * 5 / 192) + eps * (3 / 128 - n * 5 / 192 + eps * 7 / 512)),
     ]
     return a3, c3

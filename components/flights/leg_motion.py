@@ -10,12 +10,16 @@ import numpy as np
 from geographiclib.geodesic import Geodesic
 
 from components.flights.fleet import evaluate_in_blocks
-from components.flights.geodesic_motion import apply_elementwise, geodesic_state, power
+from components.flights.geodesic_motion import (
+    apply_elementwise,
+    position_and_yaw_on_geodesic,
+    power_rounded_as_python,
+)
 from components.geometry import (
     ECCENTRICITY_SQUARED,
     TWO_PI,
     TrajectoryState,
-    local_axes,
+    east_north_up_axes,
     normal_to_degrees,
     radii_of_curvature,
     remainder,
@@ -68,7 +72,7 @@ def turn_parameters(
     table = circle(lat_deg, lon_deg, alt_m, azimuth_rad, radius, rate_rad_s, climb_mps)
     # The circle in the chart is off the azimuth by some 1e-8 to 1e-6 rad, which turns in a row
     # would add up: it is begun as much the other way.
-    yaw = turn_state(table, np.zeros(np.size(radius)))[3]
+    yaw = position_and_yaw_on_turn(table, np.zeros(np.size(radius)))[3]
     off_rad = apply_elementwise(
         _wrap_to_half_turn_rad, (yaw if circle is _turn_tables else float(yaw[0])) - azimuth_rad
     )
@@ -101,8 +105,8 @@ def _turn_table(
         radius * abeam / (abeam + alt_m),
     )
     c_lat, c_lon = np.array([centre["lat2"]]), np.array([centre["lon2"]])
-    axes = [np.array(axis)[:, 0] for axis in local_axes(c_lat, c_lon)]
-    start = np.array(local_axes(np.array([lat_deg]), np.array([lon_deg]))[2])[:, 0]
+    axes = [np.array(axis)[:, 0] for axis in east_north_up_axes(c_lat, c_lon)]
+    start = np.array(east_north_up_axes(np.array([lat_deg]), np.array([lon_deg]))[2])[:, 0]
     c_meridian, c_prime_vertical = radii_of_curvature(float(c_lat[0]))
     per_east, per_north = 1.0 / (c_prime_vertical + alt_m), 1.0 / (c_meridian + alt_m)
     east, north, up = (float(axis @ start) for axis in axes)
@@ -130,14 +134,17 @@ def _turn_tables(
     meridian, prime_vertical = radii_of_curvature(lat_deg)
     side = np.copysign(0.5 * math.pi, rate_rad_s)
     # Metres aloft to metres on the ellipsoid, along the line to the centre (abeam).
-    cos2, sin2 = (power(apply_elementwise(of, azimuth_rad), 2) for of in (math.sin, math.cos))
+    cos2, sin2 = (
+        power_rounded_as_python(apply_elementwise(of, azimuth_rad), 2)
+        for of in (math.sin, math.cos)
+    )
     abeam = 1.0 / (cos2 / meridian + sin2 / prime_vertical)
     ways = apply_elementwise(math.degrees, azimuth_rad + side), radius * abeam / (abeam + alt_m)
     places = zip(*(value.tolist() for value in (lat_deg, lon_deg, *ways)), strict=True)
     centres = [Geodesic.WGS84.Direct(*place) for place in places]
     c_lat, c_lon = (np.array([one[name] for one in centres]) for name in ("lat2", "lon2"))
-    axes = np.array(local_axes(c_lat, c_lon))
-    starts = np.array(local_axes(lat_deg, lon_deg)[2]).T.copy()
+    axes = np.array(east_north_up_axes(c_lat, c_lon))
+    starts = np.array(east_north_up_axes(lat_deg, lon_deg)[2]).T.copy()
     of_each = np.ascontiguousarray(axes.transpose(2, 0, 1))
     east, north, up = np.array(
         [[axis @ start for axis in of_one] for of_one, start in zip(of_each, starts, strict=True)]
@@ -161,7 +168,7 @@ def _arc_per_chord(chord: float, up: float) -> float:
     return math.atan2(chord, up) / chord if chord else 1.0
 
 
-def turn_state(
+def position_and_yaw_on_turn(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return latitude, longitude (deg), altitude (m) and yaw (rad) on turns after times (s)."""
@@ -242,7 +249,7 @@ def ramp_parameters(
     lasts_s = np.hypot(*change) / acceleration_mps2
     at_once = np.where(lasts_s > 0.0, lasts_s, 1.0)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
-    east, north, up = (np.array(axis) for axis in local_axes(lat_deg, lon_deg))
+    east, north, up = (np.array(axis) for axis in east_north_up_axes(lat_deg, lon_deg))
     rows = (
         1.0 / (prime_vertical + alt_m), 1.0 / (meridian + alt_m), *velocity_mps,
         change[0] / at_once, change[1] / at_once, lasts_s, alt_m, yaw_rad,
@@ -250,7 +257,7 @@ def ramp_parameters(
     return np.concatenate([east, north, up, np.stack(rows)])
 
 
-def ramp_velocity(table: FloatArray, elapsed: FloatArray) -> Pair:
+def ramp_velocity_in_start_axes(table: FloatArray, elapsed: FloatArray) -> Pair:
     """Return ramps' velocities (m/s) east and north after times (s), in each one's start axes."""
     gone = np.minimum(elapsed, table[_LASTS])
     return (
@@ -259,7 +266,7 @@ def ramp_velocity(table: FloatArray, elapsed: FloatArray) -> Pair:
     )
 
 
-def ramp_state(
+def position_and_yaw_on_ramp(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return latitude, longitude (deg), altitude (m) and yaw (rad) on ramps (level, velocity
@@ -274,7 +281,7 @@ def ramp_state(
         (table[_FROM_EAST] * elapsed + table[_MORE_EAST] * more) * table[_PER_EAST],
         (table[_FROM_NORTH] * elapsed + table[_MORE_NORTH] * more) * table[_PER_NORTH],
     )
-    velocity = ramp_velocity(table, elapsed)
+    velocity = ramp_velocity_in_start_axes(table, elapsed)
     motion = velocity[0] * table[_PER_EAST], velocity[1] * table[_PER_NORTH]
     rho = np.maximum(np.hypot(*offset), _LEAST_ANGLE)
     lat, lon, to_east, to_north = _position_and_direction(table, offset, motion, rho)
@@ -303,7 +310,7 @@ class Segment:
     speed_mps: float
 
 
-def hold_state(
+def position_and_yaw_held(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return latitude, longitude (deg), altitude (m) and yaw (rad) of aircraft that stay in one
@@ -316,7 +323,8 @@ def hold_state(
 
 
 FORMULAS = {
-    "geodesic": geodesic_state, "turn": turn_state, "hold": hold_state, "ramp": ramp_state,
+    "geodesic": position_and_yaw_on_geodesic, "turn": position_and_yaw_on_turn,
+    "hold": position_and_yaw_held, "ramp": position_and_yaw_on_ramp,
 }  # fmt: skip
 KINDS: tuple[Kind, ...] = ("geodesic", "turn", "hold", "ramp")
 
@@ -356,13 +364,15 @@ class Ramps(Growing):
 
     def velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return ramps' velocities (2, n) to the east and north (m/s), each at its own time (s)."""
-        return np.stack(ramp_velocity(*self._tables_and_elapsed(aircraft, time_s)[:2]))
+        return np.stack(
+            ramp_velocity_in_start_axes(*self._tables_elapsed_and_starts(aircraft, time_s)[:2])
+        )
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the ground speeds (m/s) of the given ramps, each at its own time (s)."""
         return np.asarray(np.hypot(*self.velocities_mps(aircraft, time_s)))
 
-    def _tables_and_elapsed(
+    def _tables_elapsed_and_starts(
         self, aircraft: IntArray, time_s: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return ramps' tables (rows, n), times (s) since their starts, and start times (s)."""
@@ -372,6 +382,8 @@ class Ramps(Growing):
         return table, elapsed, start_s
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        table, elapsed, start_s = self._tables_and_elapsed(aircraft, time_s)
+        table, elapsed, start_s = self._tables_elapsed_and_starts(aircraft, time_s)
         level = np.zeros(len(elapsed))
-        return TrajectoryState(*ramp_state(table, elapsed), level, level, time_s >= start_s)
+        return TrajectoryState(
+            *position_and_yaw_on_ramp(table, elapsed), level, level, time_s >= start_s
+        )

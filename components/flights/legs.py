@@ -13,13 +13,15 @@ from pydantic import Field, model_validator
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.geodesic_motion import flight_time_s, geodesic_parameters, leg_radius_m
 from components.flights.leg_motion import FORMULAS, Kind, Segment, turn_parameters
-from components.geometry import enu_to_geodetic, heading_from_deg
+from components.geometry import enu_to_geodetic, heading_rad_from_deg
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.parameters import Parameters
 
 
 def require(condition: bool, name: str, value: object, allowed: str) -> None:
-    """Raise ValueError with the argument's name, its value and what is allowed."""
+    """Raise ValueError with an argument's name, value and what is allowed if a condition is
+    false.
+    """
     if not condition:
         raise ValueError(f"{name} is {value}: it must {allowed}")
 
@@ -190,7 +192,7 @@ class LegBuilder:
         if isinstance(leg, Climb):
             return self._add_straight(climb, self._time_to_climb(leg, climb))
         if leg.heading_deg is not None:
-            self.heading = heading_from_deg(leg.heading_deg)
+            self.heading = heading_rad_from_deg(leg.heading_deg)
         return self._add_straight(climb, leg.duration_s)
 
     def _time_to_climb(self, leg: Climb, climb: float) -> float | None:
@@ -249,7 +251,7 @@ class LegBuilder:
                 f"waypoint ({point}) lies straight above or below the place before it: use a "
                 "climb leg with a speed_mps of 0"
             )
-        self.heading = heading_from_deg(line["azi1"])
+        self.heading = heading_rad_from_deg(line["azi1"])
         level = geodesic_parameters(*self.position, self.heading, self.speed, 0.0)
         duration = flight_time_s(distance, self.speed, self.position[2], alt, leg_radius_m(level))
         self._add_straight(rise / duration, duration)

@@ -21,7 +21,7 @@ from components.flights.steering_plan import (
     steered_parts,
     times_around_s,
 )
-from components.geometry import TrajectoryState, heading_from_deg, wrap_longitude_deg
+from components.geometry import TrajectoryState, heading_rad_from_deg, wrap_longitude_deg
 from components.messages.steering import Manoeuvre
 from dsa_des.arrays.growing_arrays import Growing
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -69,14 +69,14 @@ def straight_fleet(
             flights.append(ScriptedTrajectory(name, **one))
         return ScriptedFleet(flights)
     lon = np.where((lon_deg >= -180.0) & (lon_deg < 180.0), lon_deg, wrap_longitude_deg(lon_deg))
-    headings = np.array([heading_from_deg(heading) for heading in heading_deg.tolist()])
+    headings = np.array([heading_rad_from_deg(heading) for heading in heading_deg.tolist()])
     table = geodesic_parameters(lat_deg, lon, alt_m, headings, speed_mps, climb_mps)
     pitches = list(map(atan2, climb_mps.tolist(), speed_mps.tolist()))
     path_mps = speed_mps / np.array(list(map(cos, pitches)))
     yaw, pitch, roll = fixed_deg.tolist()
-    fixed = [list(map(heading_from_deg, yaw)), *(list(map(radians, a)) for a in (pitch, roll))]
+    fixed = [list(map(heading_rad_from_deg, yaw)), *(list(map(radians, a)) for a in (pitch, roll))]
     zero, straight = np.zeros(len(names)), KINDS.index("geodesic")
-    return ScriptedFleet.of_columns(
+    return ScriptedFleet.of_columns_unchecked(
         names,
         np.stack((start_time_s, end_time_s)),
         np.array(fixed),
@@ -144,7 +144,9 @@ class SteeredFleet(Growing, Fleet):
     def _flight_of(self, part: int) -> ScriptedTrajectory:
         if part < 0:
             ramp, start_s = self._ramps.segment(~part)
-            return ScriptedTrajectory.of_segments("ownship", [ramp], (None,) * 3, start_s, inf)
+            return ScriptedTrajectory.of_segments_unchecked(
+                "ownship", [ramp], (None,) * 3, start_s, inf
+            )
         flown: ScriptedTrajectory = self._flown[part] or self._parts[part]
         return flown
 
@@ -177,7 +179,7 @@ class SteeredFleet(Growing, Fleet):
         """Return the states (n,) of the given ownships, each at its own time (s), flown by the
         first ``known`` of their manoeuvres or by all.
         """
-        own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
+        own, after, which = self._rows_before_after_and_part(aircraft, time_s, known)
         if not len(after):
             return self._states_before_steering(aircraft, time_s)
         steered = self._states_of_parts(which, time_s[after])
@@ -205,7 +207,7 @@ class SteeredFleet(Growing, Fleet):
         state: TrajectoryState = self._alone.at(time_s)
         return state
 
-    def _split_by_manoeuvre(
+    def _rows_before_after_and_part(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None
     ) -> tuple[IntArray, IntArray, IntArray]:
         """Return the indices of rows before their ownship's first manoeuvre, those of rows after
@@ -221,13 +223,15 @@ class SteeredFleet(Growing, Fleet):
         part = np.where(begun, count, 0)
         early = (~begun & (count > 0)).nonzero()[0]
         if len(early):
-            part[early] = self._count_begun(aircraft[early], time_s[early], count[early] - 1)
+            part[early] = self._count_begun_parts(aircraft[early], time_s[early], count[early] - 1)
         after = part.nonzero()[0]
         own = _NOBODY if len(after) == len(part) else np.flatnonzero(part == 0)
         return own, after, self._part[aircraft[after], part[after] - 1]
 
-    def _count_begun(self, aircraft: IntArray, time_s: FloatArray, most: IntArray) -> IntArray:
-        """Return how many of the first parts of some begun by a time, by halving what it may be."""
+    def _count_begun_parts(
+        self, aircraft: IntArray, time_s: FloatArray, most: IntArray
+    ) -> IntArray:
+        """Return how many of the first ``most`` parts of each aircraft have begun by its time."""
         least = np.zeros_like(most)
         for _ in range(int(most.max()).bit_length()):
             half = (least + most) // 2
@@ -250,7 +254,7 @@ class SteeredFleet(Growing, Fleet):
         """Return the ground speeds (m/s) of the given ownships, each at its own time, flown by the
         first ``known`` of their manoeuvres or by all.
         """
-        own, after, which = self._split_by_manoeuvre(aircraft, time_s, known)
+        own, after, which = self._rows_before_after_and_part(aircraft, time_s, known)
         speed_mps = np.empty(len(time_s))
         speed_mps[own] = self._flights.ground_speeds_mps(aircraft[own], time_s[own])
         scripts, ramps = which >= 0, which < 0
@@ -265,7 +269,7 @@ class SteeredFleet(Growing, Fleet):
         """Return the fixed yaw, pitch and roll (3, n) of the given ownships, each at its own time;
         NaN where not fixed or after a manoeuvre.
         """
-        own, _, _ = self._split_by_manoeuvre(aircraft, time_s, known)
+        own, _, _ = self._rows_before_after_and_part(aircraft, time_s, known)
         fixed_rad = np.full((3, len(time_s)), np.nan)
         fixed_rad[:, own] = self._flights.fixed_attitudes_rad(aircraft[own], time_s[own])
         return fixed_rad
@@ -328,7 +332,7 @@ class SteeredFleet(Growing, Fleet):
         self, ownship: IntArray, time_s: FloatArray, given: FloatArray
     ) -> Ramps:
         """Return the ramps from ownships' velocities at their times to the commanded ones."""
-        _, after, which = self._split_by_manoeuvre(ownship, time_s, None)
+        _, after, which = self._rows_before_after_and_part(ownship, time_s, None)
         velocity = np.full((2, len(time_s)), np.nan)
         at_s, scripts, ramps = time_s[after], which >= 0, which < 0
         velocity[:, after[ramps]] = self._ramps.velocities_mps(~which[ramps], at_s[ramps])

@@ -165,7 +165,7 @@ def fly_point_mass(
 DYNAMICS = {"euler": fly_euler, "point_mass": fly_point_mass}
 
 
-def eased_turn_rates(
+def eased_turn_durations_and_rates(
     left_rad: float,
     left_before_rad: float,
     rate_rad_s: float,

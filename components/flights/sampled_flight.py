@@ -10,14 +10,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from components.flights.attitude import attitude_from_path, fit_path, overlapping_path_blocks
+from components.flights.attitude import (
+    attitude_from_path,
+    fit_velocity_and_acceleration,
+    overlapping_path_blocks,
+)
 from components.flights.fleet import (
     CELLS_AT_ONCE,
     Fleet,
     PieceSearch,
-    check_times,
-    empty_state,
+    checked_one_axis_times,
     evaluate_in_blocks,
+    uninitialized_state,
 )
 from components.flights.sampled_segments import (
     ATTITUDE_ROWS,
@@ -27,7 +31,7 @@ from components.flights.sampled_segments import (
     checked_samples,
     evaluate_segments,
     fit_segments,
-    locate,
+    segments_elapsed_and_presence,
 )
 from components.geometry import (
     TrajectoryState,
@@ -116,7 +120,7 @@ class SampledTrajectory:
         )
         #: After which samples it is not there until the next one; None where there is no such.
         self.away = away if away is not None and away.any() else None
-        attitude = self._attitude(path, wind_east_north_mps)
+        attitude = self._attitude_of_path_rad(path, wind_east_north_mps)
         yaw, pitch, roll = (
             given.get(key, derived)
             for key, derived in zip(("yaw_rad", "pitch_rad", "roll_rad"), attitude, strict=True)
@@ -124,7 +128,7 @@ class SampledTrajectory:
         self.yaw_rad, self.pitch_rad, self.roll_rad = wrap_heading_rad(yaw), pitch, roll
         self.max_speed_mps = self._speed_bound()
 
-    def _attitude(
+    def _attitude_of_path_rad(
         self, path: tuple[FloatArray, ...], wind_east_north_mps: tuple[float, float]
     ) -> tuple[FloatArray, ...]:
         """Return yaw, pitch and roll (rad) of a path, derived singly for pieces between gaps."""
@@ -208,7 +212,7 @@ class SampledTrajectory:
         position = (lat_deg, wrap_longitude_deg(lon_deg), alt_m)
         yaw, pitch, roll = attitude_from_path(time_s, *position)
         fitted = fit_segments(time_s, position, (wrap_heading_rad(yaw), pitch, roll))
-        speeds = _mean_speed_bound(time_s, *position).tolist()
+        speeds = _largest_mean_speed_bound(time_s, *position).tolist()
         (table, end), flights = place, []
         for number, (name, speed_mps) in enumerate(zip(names, speeds, strict=True)):
             start, end = end, end + len(time_s)
@@ -222,7 +226,7 @@ class SampledTrajectory:
             flights.append(made)
         return flights
 
-    def in_air(
+    def with_attitude_in_wind(
         self, east_mps: float, north_mps: float, alt_m: FloatArray | None = None
     ) -> SampledTrajectory:
         """Return the same flight with its path-derived attitude angles derived anew in a wind.
@@ -250,7 +254,7 @@ class SampledTrajectory:
         """Return the aircraft's state at some times."""
         times = np.asarray(time_s, dtype=np.float64)
         flat = np.ascontiguousarray(times).reshape(-1)
-        segment, elapsed, present = locate(self.sample_times_s, flat)
+        segment, elapsed, present = segments_elapsed_and_presence(self.sample_times_s, flat)
         if self.away is not None:
             present &= ~self.away[segment] | (elapsed == 0.0)
         table = np.ascontiguousarray(self.coefficients[:, segment])
@@ -268,7 +272,7 @@ class SampledTrajectory:
         1.5 times its mean velocity at most.
         """
         position = self.lat_deg, self.lon_deg, self.alt_m
-        mean = float(_mean_speed_bound(self.sample_times_s, *position))
+        mean = float(_largest_mean_speed_bound(self.sample_times_s, *position))
         if self.velocity_enu_mps is None or len(self.sample_times_s) < 2:
             return mean
         east, north, up = self.velocity_enu_mps
@@ -291,7 +295,7 @@ class SampledFleet(Fleet):
 
     @cached_property
     def _coefficients_and_shifts(self) -> tuple[FloatArray, IntArray | None]:
-        """Return the coefficients of all segments, a row for each segment, grouped by aircraft.
+        """Return all segments' coefficients, a row each, and flights' row shifts (None if all 0).
 
         With it goes how much later those of each are than in order; None for nowhere. A table is
         there once: flights have theirs from there, and so has another fleet of some of them.
@@ -306,7 +310,7 @@ class SampledFleet(Fleet):
                 flight.coefficients = table[start:end, : len(flight.coefficients)].T
                 flight.place = table, start
         starts = [flight.place[1] for flight in self._flights if flight.place is not None]
-        later = np.array(starts, dtype=np.int64) - self._find.first
+        later = np.array(starts, dtype=np.int64) - self._segment_search.first
         return table, later if later.any() else None
 
     @cached_property
@@ -327,13 +331,13 @@ class SampledFleet(Fleet):
         return self._flights[index]
 
     @cached_property
-    def _find(self) -> PieceSearch:
+    def _segment_search(self) -> PieceSearch:
         return PieceSearch.from_starts([flight.sample_times_s for flight in self._flights])
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Return every aircraft's state at some times."""
-        times, count = check_times(time_s), len(self)
-        state = empty_state(len(times), count)
+        times, count = checked_one_axis_times(time_s), len(self)
+        state = uninitialized_state(len(times), count)
         rows = max(1, CELLS_AT_ONCE // max(1, count))
         for first in range(0, len(times), rows) if count else ():
             block = slice(first, first + rows)
@@ -342,14 +346,14 @@ class SampledFleet(Fleet):
             index, elapsed = np.empty(shape, dtype=np.intp), np.empty(shape)
             present = np.empty(shape, dtype=bool)
             for base, columns in self._flights_by_sample_times:
-                segment, since, there = locate(base, t)
-                index[:, columns] = segment[:, np.newaxis] + self._find.first[columns]
+                segment, since, there = segments_elapsed_and_presence(base, t)
+                index[:, columns] = segment[:, np.newaxis] + self._segment_search.first[columns]
                 elapsed[:, columns] = since[:, np.newaxis]
                 present[:, columns] = there[:, np.newaxis]
             if self._away_segments is not None:
                 present &= ~self._away_segments[index] | (elapsed == 0.0)
             aircraft = np.broadcast_to(np.arange(count), shape).reshape(-1)
-            table = self._segments(index.reshape(-1), aircraft)
+            table = self._coefficients_of_segments(index.reshape(-1), aircraft)
             values = evaluate_segments(table, elapsed.reshape(-1), present.reshape(-1))
             values = values.reshape(shape)
             for out, value in zip(state.arrays(), values.arrays(), strict=True):
@@ -360,22 +364,28 @@ class SampledFleet(Fleet):
         """Return states of chosen aircraft (n,), each at its own time (n,) in s."""
         return evaluate_in_blocks(self._state, aircraft, time_s)
 
-    def _segments(self, index: IntArray, aircraft: IntArray) -> FloatArray:
+    def _coefficients_of_segments(self, index: IntArray, aircraft: IntArray) -> FloatArray:
         table, later = self._coefficients_and_shifts
         index = index if later is None else index + later.take(aircraft)
         return np.ascontiguousarray(table.take(index, axis=0).T)
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        samples, first, last = self._find.starts_s, self._find.first, self._find.last
+        samples, first, last = (
+            self._segment_search.starts_s,
+            self._segment_search.first,
+            self._segment_search.last,
+        )
         start, end = samples[first[aircraft]], samples[last[aircraft]]
         inside = np.where(time_s > start, time_s, start)
         inside = np.where(inside < end, inside, end)
-        segment = self._find(aircraft, inside)
+        segment = self._segment_search(aircraft, inside)
         present = (time_s >= start) & (time_s <= end)
         elapsed = inside - samples[segment]
         if self._away_segments is not None:
             present &= ~self._away_segments[segment] | (elapsed == 0.0)
-        return evaluate_segments(self._segments(segment, aircraft), elapsed, present)
+        return evaluate_segments(
+            self._coefficients_of_segments(segment, aircraft), elapsed, present
+        )
 
 
 _NAMES = "lat_deg", "lon_deg", "alt_m", "yaw_rad", "pitch_rad", "roll_rad"
@@ -393,7 +403,7 @@ def _stack_segment_rows(tables: Sequence[FloatArray]) -> FloatArray:
     return result
 
 
-def _mean_speed_bound(
+def _largest_mean_speed_bound(
     time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
 ) -> FloatArray:
     """Return an upper bound (m/s) on mean speeds between samples, for one or each aircraft."""
@@ -415,7 +425,9 @@ def _is_velocity_of_path(measured: Vector, time_s: FloatArray, *place: FloatArra
     """Return whether velocities fit the path: median misfit up to 5 m/s or 10 % of median speed."""
     misfit, speed = np.empty(len(time_s)), np.empty(len(time_s))
     for part, inner, rows, offsets in overlapping_path_blocks(time_s):
-        fitted, _ = fit_path(time_s[part], *(column[part] for column in place), offsets=offsets)
+        fitted, _ = fit_velocity_and_acceleration(
+            time_s[part], *(column[part] for column in place), offsets=offsets
+        )
         off = sum((m[part] - f) ** 2 for m, f in zip(measured, fitted, strict=True))
         misfit[rows] = np.sqrt(off)[inner]
         speed[rows] = np.sqrt(sum(f**2 for f in fitted))[inner]

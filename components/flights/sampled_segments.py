@@ -11,7 +11,7 @@ from components.geometry import (
     SEMI_MAJOR_AXIS_M,
     TrajectoryState,
     Vector,
-    local_axes,
+    east_north_up_axes,
     normal_to_degrees,
     radii_of_curvature,
     wrap_difference_rad,
@@ -109,14 +109,14 @@ def fit_segments(
     yaw_rad, pitch_rad, roll_rad = attitude_rad
     rows = STRAIGHT_ROWS if velocity_enu_mps is None else BENT_ROWS
     table = np.zeros((rows, *lat_deg.shape))
-    _, _, normal = local_axes(lat_deg, lon_deg)
+    _, _, normal = east_north_up_axes(lat_deg, lon_deg)
     start = (*normal, alt_m)
     table[_LAT], table[_LON] = lat_deg, lon_deg
     table[_YAW], table[_PITCH], table[_ROLL] = attitude_rad
     duration = np.diff(time_s).reshape(-1, *(1 for _ in lat_deg.shape[1:]))
     tangents = None
     if velocity_enu_mps is not None:
-        tangents = _tangents(lat_deg, lon_deg, alt_m, velocity_enu_mps)
+        tangents = _normal_and_altitude_rates(lat_deg, lon_deg, alt_m, velocity_enu_mps)
     bent = None if tangents is None else _cubic_segment_mask(start, tangents, duration)
     for row, value in enumerate(start):
         table[_START + row] = value
@@ -141,11 +141,11 @@ def fit_segments(
     return table
 
 
-def _tangents(
+def _normal_and_altitude_rates(
     lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray, velocity_enu_mps: Vector
 ) -> tuple[FloatArray, ...]:
     """Return the rates of the normal's components (1/s) and altitude (m/s) for velocities."""
-    east, north, _ = local_axes(lat_deg, lon_deg)
+    east, north, _ = east_north_up_axes(lat_deg, lon_deg)
     meridian, prime_vertical = radii_of_curvature(lat_deg)
     v_east, v_north, v_up = velocity_enu_mps
     turn_east = v_east / (prime_vertical + alt_m)
@@ -168,7 +168,7 @@ def _cubic_segment_mask(
     return fits & (change <= (MOST_ACCELERATION_MPS2 * duration + 1.0) ** 2)
 
 
-def locate(
+def segments_elapsed_and_presence(
     sample_times: FloatArray, times: FloatArray
 ) -> tuple[npt.NDArray[np.intp], FloatArray, npt.NDArray[np.bool_]]:
     """Return each time's segment index, time (s) since that began, and a mask (True in samples).

@@ -15,22 +15,22 @@ from components.flights.fleet import (
     Fleet,
     FormulaGroup,
     PieceSearch,
-    check_times,
-    empty_state,
+    checked_one_axis_times,
     evaluate_in_blocks,
+    uninitialized_state,
 )
 from components.flights.leg_motion import (
     FORMULAS,
     KINDS,
     LONGEST_FLIGHT_S,
     Segment,
-    ramp_velocity,
+    ramp_velocity_in_start_axes,
 )
 from components.flights.legs import AnyLeg, LegBuilder, require
 from components.geometry import (
     TrajectoryState,
     enu_to_geodetic,
-    heading_from_deg,
+    heading_rad_from_deg,
     wrap_longitude_deg,
 )
 from dsa_des.arrays.growing_arrays import Growing, GrowingArray
@@ -92,7 +92,7 @@ class ScriptedTrajectory:
             lon_deg = float(wrap_longitude_deg(np.array([lon_deg]))[0])
         start = (float(lat_deg), float(lon_deg), float(alt_m))
         builder = LegBuilder(
-            name, start, heading_from_deg(heading_deg), float(speed_mps), float(climb_mps),
+            name, start, heading_rad_from_deg(heading_deg), float(speed_mps), float(climb_mps),
             start if reference is None else reference,
         )  # fmt: skip
         segments = builder.build(legs)
@@ -126,7 +126,7 @@ class ScriptedTrajectory:
         return cls(name, **position, reference=reference, **others)
 
     @classmethod
-    def of_segments(cls, *known: Any) -> Self:
+    def of_segments_unchecked(cls, *known: Any) -> Self:
         """Return a flight of ready segments, without checks; arguments as in `_set_segments`."""
         flight = cls.__new__(cls)
         flight._set_segments(*known)
@@ -204,7 +204,7 @@ class ScriptedFleet(Growing, Fleet):
         self._columns: IntArray = np.arange(len(names))
 
     @classmethod
-    def of_columns(cls, *columns: Any) -> ScriptedFleet:
+    def of_columns_unchecked(cls, *columns: Any) -> ScriptedFleet:
         """Return a fleet of ready columns, without checks; arguments as in `_set_columns`."""
         fleet = cls.__new__(cls)
         fleet._set_columns(*columns)
@@ -243,12 +243,12 @@ class ScriptedFleet(Growing, Fleet):
         """Return the velocities (2, n) to the east and north (m/s) of the given flights, each at
         its own time; NaN where a flight is on no ramp.
         """
-        leg, elapsed = self._legs_at(self._columns[aircraft], time_s)
+        leg, elapsed = self._leg_indices_and_elapsed_s(self._columns[aircraft], time_s)
         velocity = np.full((2, len(leg)), np.nan)
         on = np.flatnonzero(self._kind[leg] == _RAMP)
         if len(on):
             table = self._leg_tables(_RAMP, self._slot[leg[on]])
-            velocity[:, on] = ramp_velocity(table, elapsed[on])
+            velocity[:, on] = ramp_velocity_in_start_axes(table, elapsed[on])
         return velocity
 
     def subset(self, columns: IntArray) -> ScriptedFleet:
@@ -272,7 +272,9 @@ class ScriptedFleet(Growing, Fleet):
             segments.append(Segment(KINDS[kind], start_s, table, *others))
         fixed = tuple(None if isnan(a) else a for a in self._fixed_rad[:, number].tolist())
         between_s = self._between_s[:, number].tolist()
-        return ScriptedTrajectory.of_segments(self._names[number], segments, fixed, *between_s)
+        return ScriptedTrajectory.of_segments_unchecked(
+            self._names[number], segments, fixed, *between_s
+        )
 
     @cached_property
     def max_speeds_mps(self) -> FloatArray:
@@ -288,7 +290,7 @@ class ScriptedFleet(Growing, Fleet):
 
     def at(self, time_s: npt.ArrayLike) -> TrajectoryState:
         """Return the states of all flights at the given times, shape (times, flights)."""
-        times = check_times(time_s)
+        times = checked_one_axis_times(time_s)
         groups, others = self._groups_and_others
         parts = [(group.columns, group.at(times)) for group in groups]
         if len(others):
@@ -298,7 +300,7 @@ class ScriptedFleet(Growing, Fleet):
             parts.append((others, several))
         if len(parts) == 1:
             return parts[0][1]
-        state = empty_state(len(times), len(self))
+        state = uninitialized_state(len(times), len(self))
         for members, part in parts:
             for out, columns in zip(state.arrays(), part.arrays(), strict=True):
                 out[:, members] = columns
@@ -308,7 +310,9 @@ class ScriptedFleet(Growing, Fleet):
         """Return the states (n,) of the given flights, each at its own time (s)."""
         return evaluate_in_blocks(self._state, self._columns[aircraft], time_s)
 
-    def _legs_at(self, aircraft: IntArray, time_s: FloatArray) -> tuple[IntArray, FloatArray]:
+    def _leg_indices_and_elapsed_s(
+        self, aircraft: IntArray, time_s: FloatArray
+    ) -> tuple[IntArray, FloatArray]:
         """Return the index of each flight's leg at its time, and the time (s) since it began."""
         start_s, until_s = self._between_s[0].take(aircraft), self._until_s.take(aircraft)
         elapsed = np.where(time_s > start_s, time_s, start_s)
@@ -318,7 +322,7 @@ class ScriptedFleet(Growing, Fleet):
         return leg, elapsed
 
     def _state(self, aircraft: IntArray, time_s: FloatArray) -> TrajectoryState:
-        leg, elapsed = self._legs_at(aircraft, time_s)
+        leg, elapsed = self._leg_indices_and_elapsed_s(aircraft, time_s)
         kinds, slot = self._kind.take(leg), self._slot.take(leg)
         in_use = np.flatnonzero(np.bincount(kinds)).tolist()
         if len(in_use) == 1:
@@ -341,7 +345,7 @@ class ScriptedFleet(Growing, Fleet):
 
     def ground_speeds_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
         """Return the ground speeds (m/s) of the given flights, each at its own time."""
-        leg, _ = self._legs_at(self._columns[aircraft], time_s)
+        leg, _ = self._leg_indices_and_elapsed_s(self._columns[aircraft], time_s)
         level = self._legs[3][leg] * np.cos(self._legs[1][leg])
         level = np.where(self._kind[leg] == _HOLD, 0.0, level)
         if _RAMP not in self._tables:

@@ -13,11 +13,11 @@ import numpy as np
 from components.arguments.units import STANDARD_GRAVITY_M_S2
 from components.flights.leg_motion import LARGEST_TURN_RADIUS_M, Segment
 from components.flights.legs import Straight, Turn, segments_of_each
-from components.flights.point_mass import eased_turn_rates
+from components.flights.point_mass import eased_turn_durations_and_rates
 from components.flights.scripted_flights import MOST_ALT_M, ScriptedTrajectory
 from components.geometry import (
     TrajectoryState,
-    heading_from_deg,
+    heading_rad_from_deg,
     line_of_sight_ned,
     wrap_longitude_deg,
 )
@@ -55,7 +55,7 @@ class Turning(NamedTuple):
     def eased_pieces(self, manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
         """Return the pieces of an eased turn to the manoeuvre's heading, the shorter way round."""
         left_rad = math.remainder(manoeuvre.heading_rad - self.track_rad, 2.0 * math.pi)
-        rates = eased_turn_rates(
+        rates = eased_turn_durations_and_rates(
             left_rad,
             left_rad + self.turned_rad,
             self.rate_rad_s,
@@ -88,13 +88,13 @@ class SteeringPlan(NamedTuple):
     def with_manoeuvre(self, manoeuvre: Manoeuvre, alt_m: float, turning: Turning) -> SteeringPlan:
         """Return the plan changed by a manoeuvre at an altitude; what it does not command stays."""
         plan = self
-        speed_now_mps = _mean_rate(self.speeds, 0.0, self.speed_mps)
+        speed_now_mps = _mean_rate_of_first_piece(self.speeds, 0.0, self.speed_mps)
         if manoeuvre.eases_rad > 0.0:
             plan = plan._replace(turns=turning.eased_pieces(manoeuvre, speed_now_mps))
         elif manoeuvre.turn_rad != 0.0:
             plan = plan._replace(turns=_turn_pieces(manoeuvre, speed_now_mps))
         if manoeuvre.vertical_speed_mps != 0.0:
-            climb_mps = _mean_rate(self.climbs, 0.0, self.climb_mps)
+            climb_mps = _mean_rate_of_first_piece(self.climbs, 0.0, self.climb_mps)
             plan = plan._replace(
                 climbs=_speed_change_pieces(
                     climb_mps, manoeuvre.vertical_speed_mps, manoeuvre.vertical_acceleration_mps2
@@ -108,7 +108,7 @@ class SteeringPlan(NamedTuple):
                 climbs=((rise_s, rate_mps, 0.0),) if rise_s > 0.0 else (), climb_mps=0.0
             )
         if manoeuvre.speed_mps != 0.0:
-            speed_mps = _mean_rate(self.speeds, 0.0, self.speed_mps)
+            speed_mps = _mean_rate_of_first_piece(self.speeds, 0.0, self.speed_mps)
             change = max(manoeuvre.speed_mps, -speed_mps)
             plan = plan._replace(
                 speeds=_speed_change_pieces(speed_mps, change, manoeuvre.acceleration_mps2),
@@ -123,8 +123,8 @@ class SteeringPlan(NamedTuple):
         while plan.turns or plan.climbs or plan.speeds:
             parts = plan.turns, plan.climbs, plan.speeds
             lasts_s = min(part[0][0] for part in parts if part)
-            climb_mps = _mean_rate(plan.climbs, lasts_s, plan.climb_mps)
-            speed_mps = max(_mean_rate(plan.speeds, lasts_s, plan.speed_mps), 0.0)
+            climb_mps = _mean_rate_of_first_piece(plan.climbs, lasts_s, plan.climb_mps)
+            speed_mps = max(_mean_rate_of_first_piece(plan.speeds, lasts_s, plan.speed_mps), 0.0)
             rate_deg_s = plan.turns[0][1] if plan.turns else 0.0
             legs.append(_leg(lasts_s, speed_mps, climb_mps, rate_deg_s))
             plan = plan.remaining_after(lasts_s)
@@ -206,8 +206,10 @@ def _remaining_pieces(pieces: Pieces, elapsed_s: float) -> Pieces:
     return ()
 
 
-def _mean_rate(pieces: Pieces, first_s: float, without: float) -> float:
-    """Return the mean rate over the first piece's ``first_s``, or ``without`` if there is none."""
+def _mean_rate_of_first_piece(pieces: Pieces, first_s: float, without: float) -> float:
+    """Return the mean rate over the first ``first_s`` of the first piece; ``without`` if no
+    piece.
+    """
     if not pieces:
         return without
     lasts_s, mean, change = pieces[0]
@@ -243,7 +245,7 @@ def steered_parts(
             heading_deg = math.degrees(math.atan2(east_m, north_m))
             speed_mps = math.hypot(north_m, east_m) / base_s
             plan = SteeringPlan(
-                (), (), _remaining_climb((high - low) / base_s, manoeuvre), (), speed_mps
+                (), (), _kept_climb_mps((high - low) / base_s, manoeuvre), (), speed_mps
             )
             turned_rad = math.remainder(
                 float(around.yaw_rad[row, 2] - around.yaw_rad[row, 0]), 2.0 * math.pi
@@ -257,7 +259,7 @@ def steered_parts(
                 _turned_angle_deg(earlier.plan.turns, elapsed_s)
                 - _turned_angle_deg(earlier.plan.turns, elapsed_s - 1.0)
             )
-            rate_rad_s = math.radians(_mean_rate(plan.turns, 0.0, 0.0))
+            rate_rad_s = math.radians(_mean_rate_of_first_piece(plan.turns, 0.0, 0.0))
         turning = Turning(math.radians(heading_deg), rate_rad_s, turned_rad)
         plan = plan.with_manoeuvre(manoeuvre, here, turning)
         starts.append(_Start(name, position, heading_deg, at_s, plan))
@@ -292,7 +294,7 @@ def _turned_angle_deg(turns: Pieces, elapsed_s: float) -> float:
     return turned_deg
 
 
-def _remaining_climb(climb_mps: float, manoeuvre: Manoeuvre) -> float:
+def _kept_climb_mps(climb_mps: float, manoeuvre: Manoeuvre) -> float:
     """Return the climb rate (m/s) a manoeuvre keeps: 0 if a turn or altitude change ends it."""
     turns = manoeuvre.turn_rad != 0.0 or manoeuvre.eases_rad > 0.0
     ends = turns or manoeuvre.climb_m != 0.0
@@ -319,7 +321,7 @@ def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
     """Return the parts flown by several plans from their starts, as if flown one by one."""
     legs = [start.plan.legs() for start in starts]
     if len(starts) > _FEW:
-        headings = np.array([heading_from_deg(start.heading_deg) for start in starts])
+        headings = np.array([heading_rad_from_deg(start.heading_deg) for start in starts])
         lat_deg, lon_deg, alt_m = np.array([start.position for start in starts]).T
         speeds = [start.plan.speed_mps for start in starts]
         known = np.isfinite([lat_deg, lon_deg, alt_m, headings, speeds])
@@ -341,7 +343,7 @@ def _fly_plans(starts: Sequence[_Start]) -> list[SteeredPart]:
 
 def _part(start: _Start, segments: list[Segment]) -> SteeredPart:
     free = (None, None, None)
-    part = SteeredPart.of_segments(start.name, segments, free, start.time_s, math.inf)
+    part = SteeredPart.of_segments_unchecked(start.name, segments, free, start.time_s, math.inf)
     part.plan = start.plan
     return part
 

@@ -57,7 +57,7 @@ class ChildProcess:
                 [sys.executable, "-I", "-S", "-c", _GUARD, *leaves], stdin=subprocess.PIPE,
                 stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
             )  # fmt: skip
-        self.end = finalize(self, _end, self.process, guard, removes)
+        self.end = finalize(self, _kill_and_clean_up, self.process, guard, removes)
 
 
 def describe_exit(code: int) -> str:
@@ -67,7 +67,7 @@ def describe_exit(code: int) -> str:
     return f"ended with exit code {code}"
 
 
-def _end(process: Any, guard: Any, removes: Path | None) -> None:
+def _kill_and_clean_up(process: Any, guard: Any, removes: Path | None) -> None:
     """Kill the program's process group, await its end, close its pipes, remove a given folder."""
     if os.name == "posix":
         with suppress(OSError):

@@ -16,7 +16,7 @@ from components.estimation.frame import vectors_in_frame
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
 from components.geometry import POSITION_FIELDS, enu_to_geodetic, line_of_sight_ned
 from components.messages.columns import OWN_NED, TURNED, WGS84
-from components.messages.detections import names_of_rangeless_sensors
+from components.messages.detections import joined_names_if_all_rangeless
 from components.messages.state_tracks import COASTED, CONFIRMED, STALE_S, StateTracks
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
@@ -179,7 +179,7 @@ class Mavlink(Component):
 
     def warnings(self) -> list[str]:
         """Return a warning if a producer measures no range, as only tracks with one are sent."""
-        blind = names_of_rangeless_sensors(
+        blind = joined_names_if_all_rangeless(
             one for one in self.context.producers if one.port == "estimates"
         )
         return [f"{blind} measures no range: no track is sent"] if blind else []
@@ -214,20 +214,20 @@ class Mavlink(Component):
                 of_row = slice(int(message.offsets[row]), int(message.offsets[row + 1]))
                 self._heard += len(message.has_range[of_row])
                 self._rangeless += int(np.count_nonzero(~message.has_range[of_row]))
-                others = _tracks(*held, time_s)
+                others = _extrapolated_ranged_tracks(*held, time_s)
         datagrams = [*self._link.vehicles(others), self._link.own_state(time_s, own)]
         if time_s >= self._next_beat_s:
             self._next_beat_s = time_s + 1.0
             datagrams.insert(0, self._link.heartbeat())
         self._udp.send(datagrams)
-        self._read_messages(time_s)
+        self._read_until_reply(time_s)
         told = self._manoeuvre_to_follow(int(wake.ticks[0]), own)
         found: dict[str, Message] = {"autopilot": _row(wake, self._says)}
         if told is not None:
             found["manoeuvres"] = Manoeuvres.of([int(wake.ticks[0])], [told])
         return found
 
-    def _read_messages(self, time_s: float) -> None:
+    def _read_until_reply(self, time_s: float) -> None:
         """Read all datagrams that have arrived, waiting up to ``answer_s`` for the reply to this
         time; TimeoutError after a long silence.
         """
@@ -313,7 +313,7 @@ def _ownship_and_targets(
     return own, others
 
 
-def _tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
+def _extrapolated_ranged_tracks(message: StateTracks, rows: Any, time_s: float) -> list[Flying]:
     """Return confirmed and coasted tracks with a range, moved at constant velocity to a time.
 
     One without a detection for `STALE_S` is none.

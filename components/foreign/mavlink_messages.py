@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable
 from typing import Any, NamedTuple
 
-from components.formats.asterix_records import callsign
+from components.formats.asterix_records import callsign_from_name
 from dsa_des.errors.optional_libraries import import_extra
 
 _E7, _MILLI, _CENTI = 1e7, 1e3, 1e2
@@ -78,11 +78,11 @@ class Link:
         """Return each aircraft's ADSB_VEHICLE message: geometric heights, courses as headings."""
         found = []
         for one in others:
-            name = (callsign(one.name) or "").encode()
+            name = (callsign_from_name(one.name) or "").encode()
             course = round(math.degrees(one.course_rad) * _CENTI) % 36000
             level = math.hypot(one.north_mps, one.east_mps)
             made = self._ours.adsb_vehicle_encode(
-                one.number, _degrees(one.lat_deg), _degrees(one.lon_deg),
+                one.number, _degrees_times_1e7(one.lat_deg), _degrees_times_1e7(one.lon_deg),
                 self._dialect.ADSB_ALTITUDE_TYPE_GEOMETRIC, _clip_to_field(one.alt_m * _MILLI, 32),
                 course, min(round(level * _CENTI), _MOST_CM_S),
                 _clip_to_field(-one.down_mps * _CENTI, 16), name,
@@ -97,7 +97,7 @@ class Link:
         speed = _clip_to_field(math.hypot(own.north_mps, own.east_mps, own.down_mps) * _CENTI, 16)
         made = self._ours.hil_state_quaternion_encode(
             round(time_s * 1e6), _quaternion(own.yaw_rad, own.pitch_rad, own.roll_rad), 0.0, 0.0,
-            0.0, _degrees(own.lat_deg), _degrees(own.lon_deg),
+            0.0, _degrees_times_1e7(own.lat_deg), _degrees_times_1e7(own.lon_deg),
             _clip_to_field(own.alt_m * _MILLI, 32),
             _clip_to_field(own.north_mps * _CENTI, 16), _clip_to_field(own.east_mps * _CENTI, 16),
             _clip_to_field(own.down_mps * _CENTI, 16), speed, speed, 0, 0, 0,
@@ -129,7 +129,7 @@ def _update_says(one: Any, says: AutopilotSays) -> AutopilotSays:
     return says
 
 
-def _degrees(angle_deg: float) -> int:
+def _degrees_times_1e7(angle_deg: float) -> int:
     return round(angle_deg * _E7)
 
 

@@ -14,7 +14,7 @@ from pydantic import BeforeValidator, Field, model_validator
 from components.aircraft.aircraft import Roster
 from components.aircraft.known_targets import offered_rosters
 from components.foreign.process_answers import message_of_table
-from components.foreign.process_link import VERSION, ProcessError, ProcessLink, frame
+from components.foreign.process_link import VERSION, ProcessError, ProcessLink, frame_parts_of_batch
 from components.messages.detections import Detections, SensorOffer
 from components.messages.state_tracks import StateTracks
 from components.messages.steering import Manoeuvres
@@ -150,7 +150,7 @@ class Process(Component):
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
     def offer(self, port: str) -> Any:
-        """Return for detections that they may have a range and state no accuracy; None for other
+        """Return an offer of detections, maybe with range, without accuracy; None for other
         ports.
         """
         return (
@@ -199,22 +199,22 @@ class Process(Component):
         frames = self._call_frames(tick, scan)
         for source, message in sent:
             for table, batch in _recorded_batches(message):
-                frames += frame(table, batch, {"block": source})
+                frames += frame_parts_of_batch(table, batch, {"block": source})
         while True:
             try:
-                return self._exchange(frames)
+                return self._ask_and_keep_state(frames)
             except ProcessError:
                 self._is_in.state = None
                 if self.p.on_failure == "stop" or self._is_in.restarts >= self.p.most_restarts:
                     raise
                 self._is_in.restarts += 1
 
-    def _exchange(self, frames: list[Any]) -> Any:
+    def _ask_and_keep_state(self, frames: list[Any]) -> Any:
         self.start()
         before = self._first_state if self._state is None else self._state
         wanted = []
         if before is not None and before is not self._is_in.state:
-            wanted = frame(_STATE, _single_row_batch(state=before), {})
+            wanted = frame_parts_of_batch(_STATE, _single_row_batch(state=before), {})
         answer = self._link.ask([*wanted, *frames], self.p.deadline_s)
         after = [table for about, table in answer if about.get("table") == _STATE]
         if type(self).rewindable:
@@ -231,7 +231,9 @@ class Process(Component):
             "arguments": json.dumps(self.p.arguments), "seed": str(self.context.streams.seed),
             "snapshots": str(type(self).rewindable).lower(),
         }  # fmt: skip
-        answer = self._link.ask(frame(_HELLO, _single_row_batch(), about), self.p.deadline_s)
+        answer = self._link.ask(
+            frame_parts_of_batch(_HELLO, _single_row_batch(), about), self.p.deadline_s
+        )
         said = answer[0][0] if answer else {}
         wrong = ""
         if said.get("table") != _HELLO:
@@ -255,7 +257,9 @@ class Process(Component):
 
     def _call_frames(self, tick: int, scan: int) -> list[Any]:
         time_s = tick / self.context.ticks_per_s
-        return frame(_CALL, _single_row_batch(tick=tick, time_s=time_s, scan=scan), {})
+        return frame_parts_of_batch(
+            _CALL, _single_row_batch(tick=tick, time_s=time_s, scan=scan), {}
+        )
 
     # -- answers -------------------------------------------------------------------------------
 

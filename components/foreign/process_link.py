@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from components.foreign.child_process import ChildProcess, describe_exit
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 VERSION = "1"
 _HEAD = struct.Struct("<Q")
@@ -30,7 +30,7 @@ class ProcessError(Exception):
     exit_code = 3
 
 
-def frame(table: str, batch: Any, about: Mapping[str, str]) -> list[Any]:
+def frame_parts_of_batch(table: str, batch: Any, about: Mapping[str, str]) -> list[Any]:
     """Return a record batch as the two parts of a frame: its length, and an Arrow stream."""
     import pyarrow as pa
 
@@ -180,7 +180,7 @@ class ProcessLink:
         said = [line for line in said if line]
         if not said:
             return "; it said nothing on standard error"
-        return "; its last words: " + shorten(printable(" | ".join(said[-5:])), 600)
+        return "; its last words: " + shorten(escape_unprintable(" | ".join(said[-5:])), 600)
 
 
 class _Frames:

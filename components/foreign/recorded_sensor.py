@@ -16,9 +16,14 @@ from components.aircraft.known_targets import offered_rosters
 from components.atmosphere.pressure_altitude import scene_air
 from components.foreign.reported_look import detections_of_reports
 from components.formats.measurement_file import Measurements, read_measurements
-from components.formats.recorded.known_kinds import captured_asterix
+from components.formats.recorded.known_kinds import asterix_blocks_of_capture
 from components.messages.columns import OWN_VELOCITY, POSE
-from components.messages.detections import EXTRAS, Detections, SensorOffer, report_interval_promises
+from components.messages.detections import (
+    EXTRAS,
+    Detections,
+    SensorOffer,
+    range_and_report_interval_pairs,
+)
 from components.messages.targets import RelativeTargets
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import (
@@ -117,13 +122,13 @@ class RecordedSensor(Component):
 
     @classmethod
     def clock_of(cls, parameters: Any) -> ClockSpec | None:
-        """Return the nominal clock, where there is one."""
+        """Return the nominal clock of the measurements, or None where there is none."""
         return None if parameters.scan_rate_hz is None else ClockSpec(parameters.scan_rate_hz)
 
     @cached_property
     def _read_measurements(self) -> Measurements:
         measured = read_measurements(
-            self.p.file, self.p.block, self.p.place, captured_asterix(self.p.file)
+            self.p.file, self.p.block, self.p.place, asterix_blocks_of_capture(self.p.file)
         )
         p, entries = self.p, measured.entries
         stated = (p.azimuth_error_deg, p.elevation_error_deg, p.range_error_m)
@@ -183,18 +188,16 @@ class RecordedSensor(Component):
         angles = [entries[name] for name in _VARIANCES[:2] if name in entries]
         known = [np.nanmedian(v) for v in angles if not np.isnan(v).all()]
         return SensorOffer(
-            self._has("range_m"), math.sqrt(12.0 * max(known, default=0.0)),
-            self._has("range_rate_m_s"), promises=self._promises_of_looks(), **same,
+            self._has_measured_values("range_m"), math.sqrt(12.0 * max(known, default=0.0)),
+            self._has_measured_values("range_rate_m_s"), promises=self._promises_of_looks(), **same,
         )  # fmt: skip
 
     def _promises_of_looks(self) -> tuple[tuple[float, float], ...]:
-        """Return the promises (`SensorOffer`) of a sensor that looks at the median interval of the
-        recorded looks; none for a single look.
-        """
+        """Return `SensorOffer.promises` by the median interval of the looks; empty for one look."""
         apart_s = np.diff(np.sort(self._read_measurements.time_s))
-        return report_interval_promises(float(np.median(apart_s))) if len(apart_s) else ()
+        return range_and_report_interval_pairs(float(np.median(apart_s))) if len(apart_s) else ()
 
-    def _has(self, name: str) -> bool:
+    def _has_measured_values(self, name: str) -> bool:
         values = self._read_measurements.entries.get(name)
         return values is not None and not np.isnan(values).all()
 
@@ -226,13 +229,15 @@ class RecordedSensor(Component):
             more = f" (and {len(wrong) - 1} more)" if len(wrong) > 1 else ""
             raise ValueError(f"{self.p.file}: {wrong[0]}{more}")
         self._target = np.array([place.get(name or "", -1) for name in measured.target], np.int64)
-        self._extras = [n for n in EXTRAS if n in _FLAGS or self._has(n)]
+        self._extras = [n for n in EXTRAS if n in _FLAGS or self._has_measured_values(n)]
         for name in _FLAGS:
             # Whoever does not say declares all that it reports, and was not cued.
             said = measured.entries.get(name, np.full(len(measured.target), np.nan))
             measured.entries[name] = np.nan_to_num(said, nan=name == "declared") > 0.5
-        self._sweeps = self._has("illuminated_s")
-        self._rates = self._has("range_rate_m_s") and set(OWN_VELOCITY) <= set(measured.looks)
+        self._sweeps = self._has_measured_values("illuminated_s")
+        self._rates = self._has_measured_values("range_rate_m_s") and set(OWN_VELOCITY) <= set(
+            measured.looks
+        )
 
     def process(self, env: Any) -> Generator[Any, None, None]:
         """Send every recorded look at its own time, to arrive when it arrived in the recording."""

@@ -72,7 +72,7 @@ def _passes_near(own: Any, one: Any) -> bool:
     return miss_m < _NEAR_M and abs(one.altitude - own.alt) / 1000.0 < _LEVEL_M
 
 
-def serve(port: int) -> set[Any]:
+def answer_and_list_senders(port: int) -> set[Any]:
     """Answer datagrams at a local port, by a stand-in autopilot for each sender, and return the
     senders' addresses at the end.
 
@@ -95,4 +95,4 @@ def serve(port: int) -> set[Any]:
 
 
 if __name__ == "__main__":
-    serve(int(sys.argv[1]))
+    answer_and_list_senders(int(sys.argv[1]))

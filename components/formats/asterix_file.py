@@ -16,7 +16,7 @@ from components.formats.asterix_records import (
     SERVICE,
     SYSTEM_TRACKS,
     AsterixRecord,
-    read_records,
+    decode_records_with_notes,
 )
 from components.formats.recording import Recording
 from components.formats.sample_columns import Altitude, SampleColumn, convert_to_enu_velocity
@@ -91,7 +91,7 @@ def recording_of_asterix(
     an aircraft that reports none its geometric height; with `altitude`, those of that kind alone.
     Times count from the day's midnight, or in UTC where an instant near the first record is known.
     """
-    records, warnings = read_records(Path(problems.path), data)
+    records, warnings = decode_records_with_notes(Path(problems.path), data)
     problems.of = "record"
     day_s = 0.0
     if of_day_s is not None and records:
@@ -120,7 +120,7 @@ def recording_of_asterix(
         if record.category not in _AIRCRAFT:
             continue
         mine = rows.setdefault(_aircraft_key(record), {})
-        sample = _sample(record, kinds)
+        sample = _time_position_velocity_of(record, kinds)
         if abs(sample[1]) > _POLE_DEG:
             problems.fail(
                 f"category {record.category:03d}, a latitude of {sample[1]:.0f} degrees: it is of "
@@ -191,7 +191,7 @@ def _plots_as_reports(
         at.append((np.radians(values["azimuth_deg"]), values["range_m"], high_m, *radar))
         kept.append(AsterixRecord(category, one.time_s, values))
     azimuth, far_m, high, lat, lon, alt = np.array(at, float).reshape(-1, 6).T
-    up = _elevations(azimuth, far_m, high, lat, alt)
+    up = _elevation_to_height_rad(azimuth, far_m, high, lat, alt)
     level_m = far_m * np.cos(up)
     there = enu_to_geodetic(
         level_m * np.sin(azimuth), level_m * np.cos(azimuth), far_m * np.sin(up),
@@ -247,7 +247,7 @@ def read_asterix_plots(
         data = read_input_bytes(Path(path)) if data is None else data
     except InputFileError as error:
         raise TrafficFileError(str(path), [str(error)]) from None
-    records, notes = read_records(Path(path), data)
+    records, notes = decode_records_with_notes(Path(path), data)
     radars = sorted({_radar_code(r) for r in records if r.category == PLOTS})
     if not radars:
         raise TrafficFileError(str(path), ["there are no plots of a radar (048) in it"])
@@ -282,7 +282,8 @@ def read_asterix_plots(
     of = scan.astype(np.int64)
     return RadarPlots(
         radars, start_s, radar_of.astype(np.int64), scan_s, lat, lon, alt, of, time_s,
-        wrap_pi(azimuth), _elevations(azimuth, far_m, height, lat[of], alt[of]), far_m, rate, notes,
+        wrap_pi(azimuth), _elevation_to_height_rad(azimuth, far_m, height, lat[of], alt[of]),
+        far_m, rate, notes,
     )  # fmt: skip
 
 
@@ -304,7 +305,7 @@ def _radar_positions(
     return filled
 
 
-def _elevations(
+def _elevation_to_height_rad(
     azimuth_rad: FloatArray, far_m: FloatArray, to_m: FloatArray, lat_deg: FloatArray,
     from_m: FloatArray,
 ) -> FloatArray:  # fmt: skip
@@ -351,7 +352,9 @@ def _aircraft_names(records: list[AsterixRecord]) -> dict[tuple[object, ...], st
     return result
 
 
-def _sample(record: AsterixRecord, kinds: Sequence[Altitude]) -> tuple[float, ...]:
+def _time_position_velocity_of(
+    record: AsterixRecord, kinds: Sequence[Altitude]
+) -> tuple[float, ...]:
     """Return a record's time, latitude, longitude, heights and velocity (east, north, up); NaN for
     what it does not contain.
     """

@@ -130,14 +130,14 @@ class AsterixRecord(NamedTuple):
     values: Mapping[str, Any]
 
 
-def callsign(name: str) -> str | None:
+def callsign_from_name(name: str) -> str | None:
     """Return a name's first 8 ASCII letters and digits, upper case, as callsign; None if none."""
     plain = "".join(c for c in name.upper() if c.isascii() and c.isalnum())
     return plain[:8] or None
 
 
-def write_records(records: Sequence[AsterixRecord]) -> bytes:
-    """Return records as data blocks, in order of time; those of one instant share blocks.
+def encode_records(records: Sequence[AsterixRecord]) -> bytes:
+    """Return records as bytes of data blocks in order of time; those of one instant share blocks.
 
     UsageError says which quantity does not fit into its bits.
     """
@@ -145,7 +145,7 @@ def write_records(records: Sequence[AsterixRecord]) -> bytes:
     blocks: list[tuple[tuple[int, float], list[Any]]] = []
     for record in sorted(records, key=lambda r: (r.time_s, ORDER[r.category])):
         kind = cats[record.category]
-        made = kind.cv_uap.cv_record.create(_items(record))
+        made = kind.cv_uap.cv_record.create(_library_form_of_items(record))
         key = record.category, record.time_s
         if not blocks or blocks[-1][0] != key or len(blocks[-1][1]) >= _MOST_OF_A_BLOCK:
             blocks.append((key, []))
@@ -223,7 +223,7 @@ _ITEMS: Mapping[int, Mapping[str, Any]] = {
 }  # fmt: skip
 
 
-def _items(record: AsterixRecord) -> dict[str, Any]:
+def _library_form_of_items(record: AsterixRecord) -> dict[str, Any]:
     """Return a record's items in the form from which the asterix library builds a record."""
     values = {**record.values, "time_of_day_s": record.time_s}
     raw = {
@@ -267,7 +267,7 @@ def _raw_value(record: AsterixRecord, name: str, field: _Field, value: Any) -> A
     return steps % 2**field.bits
 
 
-def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
+def decode_records_with_notes(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str]]:
     """Return supported categories' records in file order, each once, and notes on the rest.
 
     TrafficFileError says at which byte what is no data block or no record begins.
@@ -278,7 +278,7 @@ def read_records(path: Path, data: bytes) -> tuple[list[AsterixRecord], list[str
     now_s = math.nan
     timeless, again = 0, 0
     seen: set[tuple[int, float, bytes]] = set()  # what is sent on two addresses comes twice
-    for at, category, raw in _blocks(path, data):
+    for at, category, raw in _block_start_category_bytes(path, data):
         if category not in cats:
             left_out[category] = left_out.get(category, 0) + 1
             continue
@@ -321,7 +321,7 @@ def _block_error(path: Path, at: int, problem: str) -> TrafficFileError:
     return TrafficFileError(str(path), [f"the data block at byte {at}: {problem}"])
 
 
-def _blocks(path: Path, data: bytes) -> Iterator[tuple[int, int, bytes]]:
+def _block_start_category_bytes(path: Path, data: bytes) -> Iterator[tuple[int, int, bytes]]:
     """Yield each data block's first byte position, its category, and its records' bytes."""
     at = 0
     if not data:

@@ -226,7 +226,7 @@ def recording_of_rows(
     recording = table.recording(
         ownship, convert_to_enu_velocity, kind=kind, units=units or "the units of its header"
     )
-    if f"{height} in m" in units and _seem_feet(recording):
+    if f"{height} in m" in units and _has_altitudes_in_feet_steps(recording):
         said = "all its numbers are multiples of 25, as feet are"
         recording.notes.warnings.append(
             f"{height} has no unit and is read in m, but {said}: {height}_ft would say so"
@@ -242,7 +242,7 @@ def _drop_rows_within_second(
     rows: Iterator[tuple[int, list[str]]], identity: int, columns: Mapping[str, SampleColumn],
     warnings: list[str],
 ) -> Iterator[tuple[int, list[str]]]:  # fmt: skip
-    """Yield the rows without positions less than a second after the last of the same name."""
+    """Yield rows, but no position less than 1 s after the last kept one of the same aircraft."""
     time, lat, lon = (columns[key].index for key in ("time", "lat", "lon"))
     parse, last, left_out = time_parser(columns["time"]), dict[str, float](), 0
     for number, row in rows:
@@ -282,7 +282,7 @@ def _time_cell(row: list[str], time: int, other: int) -> str:
     return ""
 
 
-def _seem_feet(recording: Recording) -> bool:
+def _has_altitudes_in_feet_steps(recording: Recording) -> bool:
     """Return whether altitudes come in steps of 25, as transponders report feet."""
     heights = np.unique(np.concatenate([one["alt"] for one in recording.samples.values()]))
     steps = not np.any(heights % 25.0)
@@ -388,8 +388,8 @@ def _column_specs(names: list[str], altitude: Altitude | None) -> Mapping[str, C
     return specs
 
 
-def csv_columns() -> list[tuple[str, ...]]:
-    """Return quantity, accepted names, unit by default, and whether it is needed."""
+def csv_column_descriptions() -> list[tuple[str, ...]]:
+    """Return of each column, as text: quantity, accepted names, default unit, if it is needed."""
     return [
         (quantity, ", ".join(spec.names), spec.unit, "yes" if spec.required else "")
         for quantity, spec in COLUMNS.items()

@@ -35,7 +35,7 @@ from components.formats.text_rows import (
     text_of,
     tokens,
 )
-from components.geometry import Vector, enu_to_geodetic, local_axes
+from components.geometry import Vector, east_north_up_axes, enu_to_geodetic
 from dsa_des.arrays.types import FloatArray
 
 # Units are what DAIDALUS itself assumes where a file has no row of units.
@@ -142,12 +142,15 @@ def _table(
     headers = tokens(header_text)
     indices = _find_columns(problems, headers, header_line, extra)
     notes: list[str] = []
-    units, body = _find_units(problems, headers, indices, lines, notes)
+    units, body = _units_and_sample_rows(problems, headers, indices, lines, notes)
     columns = {}
     for quantity in [*_quantities_to_read(indices), *(q for q in extra if q in indices)]:
         index = indices[quantity]
         line, token = units[quantity]
-        if quantity in _OPTIONAL and clean_token(token) not in EXTRA_COLUMNS[quantity].units:
+        if (
+            quantity in _OPTIONAL
+            and clean_token(token) not in EXTRA_COLUMNS[quantity].factors_by_unit
+        ):
             notes.append(f"column {headers[index]} is in {token}, no unit of angle, and is ignored")
             continue
         spec = (COLUMNS | EXTRA_COLUMNS)[quantity]
@@ -189,7 +192,7 @@ def _quantities_to_read(indices: dict[str, int]) -> list[str]:
     return [*wanted, *first_complete_velocity(indices)]
 
 
-def _find_units(
+def _units_and_sample_rows(
     problems: Problems,
     headers: list[str],
     indices: dict[str, int],
@@ -236,8 +239,8 @@ def _to_geodetic(
         reference_alt_m=reference[2],
     )
     # The file's axes are the reference point's; the aircraft's own have turned a little.
-    origin = local_axes(np.array([reference[0]]), np.array([reference[1]]))
-    here = local_axes(lat, lon)
+    origin = east_north_up_axes(np.array([reference[0]]), np.array([reference[1]]))
+    here = east_north_up_axes(lat, lon)
     velocity = {}
     if "ve" in samples:
         along = [samples[key] for key in ("ve", "vn", "vu")]
@@ -262,8 +265,8 @@ def _rotate_to_axes(
     return [reduce(add, map(mul, xyz, axis)) for axis in axes]
 
 
-def daa_columns() -> list[tuple[str, ...]]:
-    """Return quantity, accepted names, and unit by default."""
+def daa_column_descriptions() -> list[tuple[str, ...]]:
+    """Return of each column, as text: quantity, accepted names, default unit."""
     return [
         (quantity, ", ".join(spec.names), spec.unit)
         for quantity, spec in (*COLUMNS.items(), ("yaw", EXTRA_COLUMNS["yaw"]))

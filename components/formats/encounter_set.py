@@ -91,7 +91,9 @@ class EncounterSet:
         kept = self.take(np.delete(np.arange(len(self)), indices))
         return replace(kept, skipped=self.skipped + len(indices))
 
-    def common_samples(self, index: int) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
+    def common_times_and_positions(
+        self, index: int
+    ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
         """Yield for each intruder the times (n,) that both flights have in common, and both
         positions (3, n) then: north, east, altitude (m).
         """
@@ -117,7 +119,7 @@ class EncounterSet:
         time_s, *position = fly_events([(self, row)], dynamics)
         return time_s, *(part[:, 0] for part in position)  # type: ignore[return-value]
 
-    def seconds(self, row: int) -> int:
+    def flown_seconds_of_row(self, row: int) -> int:
         """Return how long an aircraft of a set of events flies, rounded up to whole seconds."""
         return int(np.ceil(self.state["duration_s"][row]))
 
@@ -129,12 +131,12 @@ class EncounterSet:
 def fly_events(
     aircraft: Sequence[tuple[EncounterSet, int]], dynamics: str
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Fly several aircraft from their initial states by their events, each as if alone.
+    """Return times (s), north, east, altitude (m) of aircraft flown from initial states by events.
 
     All have as many `EncounterSet.seconds`; returns times (instants,) in s, and north, east and
     altitude (instants, aircraft) in m.
     """
-    whole = np.arange(aircraft[0][0].seconds(aircraft[0][1]) + 1.0)
+    whole = np.arange(aircraft[0][0].flown_seconds_of_row(aircraft[0][1]) + 1.0)
     state = {name: np.empty(len(aircraft)) for name in STATE}
     commands = np.empty((3, len(whole), len(aircraft)))
     columns_of: dict[int, list[int]] = {}
@@ -179,13 +181,13 @@ def pair_paths(
     alike: dict[tuple[int, int], list[tuple[int, EncounterSet, int, int]]] = {}
     for number, (of, index) in enumerate(encounters):
         if of.kind == TRACKS:
-            for time_s, own, other in of.common_samples(index):
+            for time_s, own, other in of.common_times_and_positions(index):
                 paths = PairPaths(time_s, own[:, :, np.newaxis], other[:, :, np.newaxis])
                 yield np.array([number]), paths
             continue
         first, end = of.first_rows[index : index + 2].tolist()
         for row in range(first + 1, end):
-            lasts = of.seconds(first), of.seconds(row)
+            lasts = of.flown_seconds_of_row(first), of.flown_seconds_of_row(row)
             alike.setdefault(lasts, []).append((number, of, first, row))
     for pairs in alike.values():
         for start in range(0, len(pairs), _PAIRS_AT_ONCE):

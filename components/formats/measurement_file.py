@@ -45,7 +45,7 @@ _FLAGS = {"true": 1.0, "false": 0.0, "1": 1.0, "0": 0.0}
 
 @dataclass(eq=False)
 class Measurements:
-    """A sensor's looks in order of time, and what each detected: the joined entries of all.
+    """A sensor's looks (scans) in order of time, and the detections of all, joined end to end.
 
     Entries ``offsets[i]:offsets[i + 1]`` belong to look i, NaN where a cell is empty; ``declared``
     and ``cued`` are 0 or 1. `looks` holds the ownship's pose and velocity, as far as the file says
@@ -306,7 +306,7 @@ def _check_values(table: _Table) -> None:
 
 
 def _group_by_instant(table: _Table, scans: _Table | None) -> Measurements:
-    """Group each time's rows into a look; where ``scans`` is given, it says which there were."""
+    """Group the rows of each time into a look (scan); ``scans``, if given, has all looks' times."""
     of = table if scans is None else scans
     time_s, first = np.unique(of.numbers["time_s"], return_index=True)
     arrival_s = of.numbers.get("arrival_s", of.numbers["time_s"])[first]

@@ -54,7 +54,7 @@ def set_of_tracks(
     )  # fmt: skip
 
 
-def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int, str]]:
+def read_waypoints_and_damage(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int, str]]:
     """Read a file of waypoints; returns the named tracks of each encounter, and by index what is
     wrong with damaged encounters.
     """
@@ -108,7 +108,7 @@ def read_waypoints(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int,
     return encounters, damaged
 
 
-def waypoints_of(encounters: EncounterSet, dynamics: str = "euler") -> bytes:
+def waypoint_file_bytes(encounters: EncounterSet, dynamics: str = "euler") -> bytes:
     """Return a set as a file of waypoints."""
     counts = np.unique(np.diff(encounters.first_rows))
     if len(counts) > 1:
@@ -227,7 +227,7 @@ def _tracks(path: Path, at: tuple[float, float] | None, others: TrackReader | No
 
 
 def _waypoints(path: Path, at: tuple[float, float], skip_damaged: bool) -> EncounterSet:
-    encounters, damaged = read_waypoints(path)
+    encounters, damaged = read_waypoints_and_damage(path)
     if damaged and (not skip_damaged or len(damaged) == len(encounters)):
         lines = [f"{path}: encounter {k}: {said}" for k, said in sorted(damaged.items())]
         raise EncounterSetError("\n".join(lines[:_MOST_SAID]))

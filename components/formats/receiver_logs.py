@@ -107,19 +107,19 @@ class _Parts:
         self._text, self._start, self.end = text, start, start
 
     def __iter__(self) -> Iterator[Any]:
-        text, at = self._text, _skip_blanks(self._text, self._start + 1)
+        text, at = self._text, _index_of_next_nonblank(self._text, self._start + 1)
         while text[at] != "]":
             part, at = _DECODER.raw_decode(text, at)
             yield part
-            at = _skip_blanks(text, at)
+            at = _index_of_next_nonblank(text, at)
             if text[at] == ",":
-                at = _skip_blanks(text, at + 1)
+                at = _index_of_next_nonblank(text, at + 1)
             elif text[at] != "]":
                 raise ValueError(f"Expecting ',' delimiter: char {at}")
         self.end = at + 1
 
 
-def _skip_blanks(text: str, at: int) -> int:
+def _index_of_next_nonblank(text: str, at: int) -> int:
     """Return the index of the next character that is not blank; ValueError if there is none."""
     if at < len(text) and not text[at].isspace():
         return at
@@ -135,13 +135,13 @@ def _decode_document(text: str, start: int) -> tuple[Any, int]:
     if text[start] != "{" or (end if end >= 0 else len(text)) - start < _LONG:
         return _DECODER.raw_decode(text, start)
     document: dict[str, Any] = {}
-    at = _skip_blanks(text, start + 1)
+    at = _index_of_next_nonblank(text, start + 1)
     while text[at] != "}":
         key, at = _DECODER.raw_decode(text, at)
-        at = _skip_blanks(text, at)
+        at = _index_of_next_nonblank(text, at)
         if not isinstance(key, str) or text[at] != ":":
             raise ValueError(f"Expecting property name and ':': char {at}")
-        at = _skip_blanks(text, at + 1)
+        at = _index_of_next_nonblank(text, at + 1)
         if text[at] == "[":
             parts = document[key] = _Parts(text, at)
             for _ in parts:
@@ -149,9 +149,9 @@ def _decode_document(text: str, start: int) -> tuple[Any, int]:
             at = parts.end
         else:
             document[key], at = _DECODER.raw_decode(text, at)
-        at = _skip_blanks(text, at)
+        at = _index_of_next_nonblank(text, at)
         if text[at] == ",":
-            at = _skip_blanks(text, at + 1)
+            at = _index_of_next_nonblank(text, at + 1)
         elif text[at] != "}":
             raise ValueError(f"Expecting ',' delimiter: char {at}")
     return document, at + 1
@@ -378,8 +378,8 @@ def _read_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Rep
             callsigns[name] = callsign
         date = cells[6]
         if date not in days:
-            days[date] = _midnight(date)
-        time_s = _instant(days[date], cells[7])
+            days[date] = _unix_midnight_of_date(date)
+        time_s = _unix_time_of_clock_text(days[date], cells[7])
         if time_s is None:
             problems.add(f"{date.strip()} {cells[7].strip()} is no date and time", line=number)
             continue
@@ -398,7 +398,7 @@ def _read_sbs(problems: Problems, data: bytes, callsigns: dict[str, str]) -> Rep
         )
 
 
-def _midnight(date: str) -> float | None:
+def _unix_midnight_of_date(date: str) -> float | None:
     try:
         day = datetime.fromisoformat(date.strip().replace("/", "-"))
     except ValueError:
@@ -409,7 +409,7 @@ def _midnight(date: str) -> float | None:
 _CLOCK = re.compile(r"\s*(\d\d):(\d\d):(\d\d(?:\.\d*)?)\s*")
 
 
-def _instant(midnight_s: float | None, clock: str) -> float | None:
+def _unix_time_of_clock_text(midnight_s: float | None, clock: str) -> float | None:
     match = _CLOCK.fullmatch(clock)
     if match is None or midnight_s is None:
         return None

@@ -37,7 +37,7 @@ class ColumnSpec:
     required: bool = False
 
     @property
-    def units(self) -> Mapping[str, float]:
+    def factors_by_unit(self) -> Mapping[str, float]:
         """Return the factor of each unit that the column may have, by the kind of its own unit."""
         return next(kind for kind in UNIT_KINDS if self.unit in kind)
 
@@ -65,8 +65,8 @@ class SampleColumn:
 def unit_factor(
     problems: Problems, spec: ColumnSpec, token: str, *, line: int | None, header: str
 ) -> float:
-    """Look up what a unit token is worth; an unknown one is noted and taken as 1."""
-    known = spec.units
+    """Return a unit token's factor; an unknown one is added to the problems and taken as 1."""
+    known = spec.factors_by_unit
     plain = clean_token(token)
     if plain in known:
         return known[plain]
@@ -86,7 +86,9 @@ _MISSING = frozenset(
 
 
 def is_missing(cell: str) -> bool:
-    """Return whether a cell says that its value is unknown."""
+    """Return whether a cell is empty or a word for no value, such as nan, none, n/a, - or
+    ground.
+    """
     return cell.strip().lower() in _MISSING
 
 
@@ -130,7 +132,7 @@ def resolve_epoch_unit(
         return column
     unit = next(unit for least, unit in _EPOCHS if float(cell) >= least)
     notes.append(f"{header} is taken in {unit}: its numbers are too large for seconds")
-    return SampleColumn(column.index, column.header, ColumnSpec((), "s").units[unit])
+    return SampleColumn(column.index, column.header, ColumnSpec((), "s").factors_by_unit[unit])
 
 
 def time_parser(column: SampleColumn) -> Callable[[str], float]:

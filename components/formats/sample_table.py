@@ -117,7 +117,7 @@ class SampleTable:
             self._problems.add("the aircraft has no name", line=line)
             return
         # An aircraft counts as named even if its row is bad: it is there, only not usable.
-        rows = self._rows_of(name)
+        rows = self._columns_of_aircraft(name)
         numbers: list[float] = []
         whole = True
         for quantity, index, factor, low, high in self._plan:
@@ -135,7 +135,7 @@ class SampleTable:
 
     def add_numbers(self, line: int, name: str, values: Sequence[Any]) -> None:
         """Add a sample of values in the columns' order; what is no number counts as missing."""
-        rows = self._rows_of(name)
+        rows = self._columns_of_aircraft(name)
         if not name:
             self._problems.add("the aircraft has no name", line=line)
             return
@@ -150,7 +150,7 @@ class SampleTable:
             numbers.append(number)
         rows.add(line, numbers)
 
-    def _rows_of(self, name: str) -> GrowingColumns:
+    def _columns_of_aircraft(self, name: str) -> GrowingColumns:
         if name not in self._aircraft:
             self._aircraft[name] = GrowingColumns(self._columns)
         return self._aircraft[name]
@@ -175,7 +175,7 @@ class SampleTable:
             return second.header
         return f"{first.header}, of {whom} aircraft {second.header}"
 
-    def _aircraft_above_sea(self, names: Collection[str]) -> list[str]:
+    def _aircraft_with_sea_heights(self, names: Collection[str]) -> list[str]:
         """Return the aircraft whose heights are above mean sea level by their column's header."""
         second = self._second.get("alt", ())
         columns = [self._columns.get("alt instead" if name in second else "alt") for name in names]
@@ -189,7 +189,7 @@ class SampleTable:
         samples = {name: to_geodetic(one) for name, one in self.samples(ownship).items()}
         said = {
             "height": self._describe_columns("alt"),
-            "above_sea": self._aircraft_above_sea(samples),
+            "above_sea": self._aircraft_with_sea_heights(samples),
             **said,
         }
         return Recording(self._problems, samples, self.notes, **said)
@@ -200,7 +200,7 @@ class SampleTable:
 
     def samples(self, ownship: str | None) -> dict[str, dict[str, FloatArray]]:
         """Check the samples; return their columns by aircraft, ownship first, in time order."""
-        kept = self._drop_gaps()
+        kept = self._lines_and_gapless_columns()
         if self._shared:
             kept = rename_duplicates(kept, self.notes)
         names = list(kept)
@@ -227,7 +227,7 @@ class SampleTable:
         self._problems.raise_if_any()
         return {own: samples.pop(own), **samples}
 
-    def _drop_gaps(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
+    def _lines_and_gapless_columns(self) -> dict[str, tuple[IntArray, dict[str, FloatArray]]]:
         """Return each aircraft's line numbers and columns, without rows and columns with gaps."""
         kept = {}
         self._lacks: dict[str, int] = {}

@@ -22,7 +22,7 @@ from components.formats.encounter_set import (
     EncounterSet,
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
-from dsa_des.errors import OutputError, did_you_mean, shown_value
+from dsa_des.errors import OutputError, did_you_mean, shortened_repr
 from dsa_des.files.input_files import InputFileError, cache_file_reads, readable_file_status
 from dsa_des.files.output_file import stream_file
 from dsa_des.files.output_names import system_error_text
@@ -47,7 +47,7 @@ _LARGEST = {
 
 
 def is_origin(value: object) -> bool:
-    """Return whether a value is [latitude, longitude] of a usable origin, in degrees."""
+    """Return whether a value is [latitude, longitude] in degrees, within ±89 and ±360."""
     return (
         isinstance(value, list | tuple)
         and len(value) == 2
@@ -63,7 +63,7 @@ class EncounterSetError(ValueError):
 
 @cache_file_reads(4)
 def read_set(path: Path, skip_damaged: bool = False) -> EncounterSet:
-    """Read a set of encounters."""
+    """Read a set of encounters from a file; with ``skip_damaged``, without the faulty ones."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -89,31 +89,33 @@ class _SetReader:
         known = [*_KEYS, *self.flat, *self.lists, *EXTRA]
         for name in table.column_names:
             if name not in known:
-                raise self.fail(f"unknown variable {name!r}{did_you_mean(name, known)}")
+                raise self.error_about_set(f"unknown variable {name!r}{did_you_mean(name, known)}")
         for name in (*_KEYS, *self.flat, *self.lists):
             if name not in names:
-                raise self.fail(f"the column {name!r} is missing{did_you_mean(name, names)}")
+                raise self.error_about_set(
+                    f"the column {name!r} is missing{did_you_mean(name, names)}"
+                )
         if table.num_rows == 0:
-            raise self.fail("holds no encounter")
+            raise self.error_about_set("holds no encounter")
 
-    def fail(self, message: str) -> EncounterSetError:
+    def error_about_set(self, message: str) -> EncounterSetError:
         return EncounterSetError(f"{self.path}: {message}")
 
     def encounters(self, skip_damaged: bool) -> EncounterSet:
         whole = self.column("encounter")
         if not ((whole == np.floor(whole)) & (whole >= 0) & (whole <= 2**53)).all():
-            raise self.fail(
+            raise self.error_about_set(
                 "column 'encounter': must be whole numbers from 0 to 2^53, none missing"
             )
         if (np.diff(whole) < 0).any():
-            raise self.fail("rows must be in order of their encounters' numbers")
+            raise self.error_about_set("rows must be in order of their encounters' numbers")
         rows_of, first = np.unique(whole.astype(np.int64), return_index=True)
         bounds = np.append(first, len(whole))
-        starts, lists, wrong = self.flat_lists()
+        starts, lists, wrong = self.starts_lists_and_faults()
         flat = {name: self.column(name) for name in self.flat}
         weights = self.column("weight")
         names = self.table["aircraft"].to_pylist()
-        wrong = self.wrong_rows(starts, lists, flat, weights, names) | wrong
+        wrong = self.first_fault_by_row(starts, lists, flat, weights, names) | wrong
         said: dict[int, str] = {}
         for row in sorted(wrong):
             index = int(np.searchsorted(bounds, row, side="right")) - 1
@@ -132,7 +134,7 @@ class _SetReader:
             more = [f"and {len(lines) - _MOST_SAID} more"] if len(lines) > _MOST_SAID else []
             raise EncounterSetError("\n".join([*lines[:_MOST_SAID], *more]))
         if not (weights > 0.0).any():
-            raise self.fail("all weights are 0")
+            raise self.error_about_set("all weights are 0")
         reference, extra = self.reference(), self.extra(first)
         result = EncounterSet(
             str(self.path), self.kind, rows_of, weights[first], bounds, tuple(map(str, names)),
@@ -146,9 +148,11 @@ class _SetReader:
             values: AnyArray = column.to_numpy(zero_copy_only=False)
             return np.asarray(values, dtype=np.float64)
         except (TypeError, ValueError):
-            raise self.fail(f"column {name!r}: holds {column.type}; numbers are needed") from None
+            raise self.error_about_set(
+                f"column {name!r}: holds {column.type}; numbers are needed"
+            ) from None
 
-    def flat_lists(self) -> tuple[IntArray, dict[str, FloatArray], dict[int, str]]:
+    def starts_lists_and_faults(self) -> tuple[IntArray, dict[str, FloatArray], dict[int, str]]:
         """Return where rows' lists begin, the lists joined by column, and by row what is wrong."""
         import pyarrow as pa
         import pyarrow.compute as pc
@@ -158,14 +162,16 @@ class _SetReader:
         for name in self.lists:
             column = self.table[name].combine_chunks()
             if not pa.types.is_list(column.type) and not pa.types.is_large_list(column.type):
-                raise self.fail(f"column {name!r}: holds {column.type}; lists are needed")
+                raise self.error_about_set(
+                    f"column {name!r}: holds {column.type}; lists are needed"
+                )
             lengths = np.asarray(pc.fill_null(pc.list_value_length(column), 0), dtype=np.int64)
             mine = np.concatenate([[0], np.cumsum(lengths)])
             try:
                 flat = pc.list_flatten(column).to_numpy(zero_copy_only=False)
                 values: FloatArray = np.asarray(flat, dtype=np.float64)
             except (TypeError, ValueError):
-                raise self.fail(
+                raise self.error_about_set(
                     f"column {name!r}: holds {column.type}; numbers are needed"
                 ) from None
             if starts is None:
@@ -186,7 +192,7 @@ class _SetReader:
         assert starts is not None
         return starts, lists, wrong
 
-    def wrong_rows(
+    def first_fault_by_row(
         self,
         starts: IntArray,
         lists: dict[str, FloatArray],
@@ -240,13 +246,13 @@ class _SetReader:
         try:
             meta = json.loads((self.table.schema.metadata or {}).get(_META, b"{}"))
         except (ValueError, RecursionError) as error:
-            raise self.fail(f"its metadata are no JSON ({str(error)[:200]})") from None
+            raise self.error_about_set(f"its metadata are no JSON ({str(error)[:200]})") from None
         if not isinstance(meta, dict):
-            raise self.fail("its metadata must be a table (a JSON object)")
+            raise self.error_about_set("its metadata must be a table (a JSON object)")
         reference = meta.get("reference_deg", [0.0, 0.0])
         if not is_origin(reference):
-            raise self.fail(
-                f"its metadata: reference_deg = {shown_value(reference)}: must be [latitude, "
+            raise self.error_about_set(
+                f"its metadata: reference_deg = {shortened_repr(reference)}: must be [latitude, "
                 "longitude] in degrees, within ±89 and ±360"
             )
         return float(reference[0]), float(reference[1])

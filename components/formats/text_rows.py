@@ -175,7 +175,7 @@ _ROWS = "a row of column names and rows of samples"
 def read_lines(
     path: Path, problems: Problems, needed: str = _TRAFFIC, holds: str = _ROWS
 ) -> list[tuple[int, str]]:
-    """Return a file's lines that hold something but comments, with their numbers from 1.
+    """Return a file's lines with their numbers from 1, without blank lines and comments.
 
     `needed` and `holds` are for the messages of a binary and of an empty file. Text may be as
     `text_of` says; lines may end in LF, CR LF or CR.
@@ -214,7 +214,9 @@ def read_content(path: Path, problems: Problems) -> bytes:
 
 
 def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
-    """Return text in UTF-8 (with or without byte-order mark), UTF-16 with one, or Latin-1."""
+    """Return bytes decoded as UTF-8, UTF-16 with byte-order mark, or Latin-1; an error if
+    binary.
+    """
     text = _decode(data)
     if text is None:
         problems.fail(f"this is a binary file: {needed} is needed")

@@ -44,16 +44,16 @@ Track = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 Tracks = tuple[list[Track], tuple[float, float] | None, list[str]]
 
 
-def _wrong(path: Path, message: str, line: int | None = None) -> EncounterSetError:
+def _error_at_line(path: Path, message: str, line: int | None = None) -> EncounterSetError:
     where = f"{path}: " if line is None else f"{path}: line {line}: "
     return EncounterSetError(where + message)
 
 
-def _table(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+def _header_and_rows(path: Path) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
     try:
-        return csv_table(read_input_text(path), partial(_wrong, path))
+        return csv_table(read_input_text(path), partial(_error_at_line, path))
     except InputFileError as error:
-        raise _wrong(path, str(error)) from None
+        raise _error_at_line(path, str(error)) from None
 
 
 def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
@@ -63,9 +63,9 @@ def _numbers(path: Path, line: int, cells: Sequence[str]) -> list[float]:
     except ValueError:
         values = [np.nan]
     if not np.isfinite(values).all():
-        raise _wrong(path, "holds something else than numbers", line)
+        raise _error_at_line(path, "holds something else than numbers", line)
     if values[0] < 0.0:
-        raise _wrong(path, f"time = {values[0]:g} is negative", line)
+        raise _error_at_line(path, f"time = {values[0]:g} is negative", line)
     return values
 
 
@@ -83,13 +83,13 @@ def is_track_file(path: Path) -> bool:
 def _indices(path: Path, names: Sequence[str], wanted: Sequence[str]) -> list[int]:
     for name in wanted:
         if name not in names:
-            raise _wrong(path, f"there is no column {name!r}{did_you_mean(name, names)}", 1)
+            raise _error_at_line(path, f"there is no column {name!r}{did_you_mean(name, names)}", 1)
     return [names.index(name) for name in wanted]
 
 
 def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
     """Read the tracks of a CSV table; one for each ``ID``, in order of their first rows."""
-    names, rows = _table(path)
+    names, rows = _header_and_rows(path)
     wanted = _PLANE if "time_s" in names else _GEODETIC
     indices = _indices(path, names, wanted)
     rows_of: dict[str, list[list[float]]] = {}
@@ -98,10 +98,10 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
         values = _numbers(path, line, [row[k] for k in indices[wanted is _GEODETIC :]])
         if wanted is _GEODETIC and not (abs(values[1]) <= 90.0 and abs(values[2]) <= 360.0):
             said = f"lat, lon = {values[1]:g}, {values[2]:g}: must lie within ±90 and ±360 degrees"
-            raise _wrong(path, said, line)
+            raise _error_at_line(path, said, line)
         rows_of.setdefault(name, []).append(values)
     if not rows_of:
-        raise _wrong(path, "a row of column names and rows of samples are needed")
+        raise _error_at_line(path, "a row of column names and rows of samples are needed")
     notes: list[str] = []
     tracks = [_sort_by_time(path, n, np.array(rows).T, notes) for n, rows in rows_of.items()]
     if wanted is _PLANE:
@@ -252,7 +252,7 @@ def name_tracks(tracks: list[Track]) -> list[tuple[str, Track]]:
 
 def read_paired_text(path: Path) -> Tracks:
     """Read one encounter of paired tracks: a row of names, one of units, and samples."""
-    names, rows = _table(path)
+    names, rows = _header_and_rows(path)
     indices = _indices(path, names, _PAIRED)
     line, units = next(rows, (0, [""] * len(names)))
     factors = []
@@ -260,7 +260,7 @@ def read_paired_text(path: Path) -> Tracks:
         unit = units[index].strip("[]").lower()
         known = {"s": 1.0} if name == "time" else {"ft": FOOT_M, "m": 1.0}
         if unit not in known:
-            raise _wrong(path, f"{name} is in {unit!r}: must be {' or '.join(known)}", line)
+            raise _error_at_line(path, f"{name} is in {unit!r}: must be {' or '.join(known)}", line)
         factors.append(known[unit])
     rows_of: dict[str, list[list[float]]] = {}
     for line, row in rows:
@@ -268,7 +268,7 @@ def read_paired_text(path: Path) -> Tracks:
             _numbers(path, line, [row[index] for index in indices[1:]])
         )
     if len(rows_of) < 2:
-        raise _wrong(path, "has one aircraft: an ownship and an intruder are needed")
+        raise _error_at_line(path, "has one aircraft: an ownship and an intruder are needed")
     notes: list[str] = []
     tracks: list[Track] = []
     for name, samples in rows_of.items():

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from components.fusion.recent_detections import Recent, split_used_rows
+from components.fusion.recent_detections import Recent, whole_rows_and_new_detections
 from components.messages.columns import OWN_VELOCITY, POSE, TOLD
-from components.messages.contributors import mask_type
+from components.messages.contributors import mask_dtype_for_sensors
 from components.messages.detections import Detections, SensorOffer
 from components.messages.fused import WITHOUT_POSE, FusedDetections, FusedWithPose
 from components.navigation.errors import has_navigation_errors
@@ -125,7 +125,7 @@ class Fusion(Component):
 
     def merge_recent(self, arrivals: dict[str, Arrivals], wake: Wake) -> dict[str, Arrivals]:
         """Return every sensor's new and recent rows; store those later rows may combine with."""
-        together, self._recent = self._recent.add_arrivals(
+        together, self._recent = self._recent.joined_and_kept_arrivals(
             arrivals, wake.first_run, self.keep_ticks
         )
         return together
@@ -174,7 +174,7 @@ class Fusion(Component):
         targets = np.concatenate([one.message.target for one in arrivals.values()])
         used = self._recent.used_mask(arrivals)
         row = fused.row_of_entries
-        whole, at, alone = split_used_rows(row, parts, made, used)
+        whole, at, alone = whole_rows_and_new_detections(row, parts, made, used)
         used[parts[parts >= 0]] = True
         self._recent = self._recent.mark_used(arrivals, used)
         row = np.concatenate([row[whole], at])
@@ -202,22 +202,24 @@ class Fusion(Component):
         These are numbered over the arrivals, one after the other; -1 is none.
         """
         every = _Entries(self.sensors, arrivals, entries)
-        contributors: Any = np.zeros(len(row), dtype=mask_type(len(self.sensors)))
+        contributors: Any = np.zeros(len(row), dtype=mask_dtype_for_sensors(len(self.sensors)))
         for index, (rows, _) in every.found.items():
             contributors[rows] |= 1 << index
-        angle_source, of_angles = every.best_sources(self.by_angles)
-        range_source, of_range = every.best_sources(self.by_range)
+        angle_source, of_angles = every.best_sensor_and_entry(self.by_angles)
+        range_source, of_range = every.best_sensor_and_entry(self.by_range)
         parts = [of_angles, of_range]
         values = {name: every.values_at(attrgetter(name), of_angles) for name in _ANGLES}
         values |= {name: every.values_at(attrgetter(name), of_range) for name in _RANGES}
-        pose = every.values_at(poses, of_angles) if self._with_pose else None
+        pose = every.values_at(ownship_poses_of_entries, of_angles) if self._with_pose else None
         told = every.values_at(reported_error_columns, of_range) if self._told else None
         moves = None
         if self.by_range_rate:
-            _, of_rate = every.best_sources(self.by_range_rate)
+            _, of_rate = every.best_sensor_and_entry(self.by_range_rate)
             parts.append(of_rate)
             values |= {name: every.values_at(attrgetter(name), of_rate) for name in _RATES}
-            moves = every.values_at(velocities, of_rate) if self._with_pose else None
+            moves = (
+                every.values_at(ownship_velocities_of_entries, of_rate) if self._with_pose else None
+            )
         message = FusedWithPose if self._navigation_errs else FusedDetections
         fused = message(
             tick=instants.tick,
@@ -247,15 +249,15 @@ def largest_delay_s(sensor: Producer) -> Fraction:
     return sensor.latest_s + (own_s or Fraction(0))
 
 
-def poses(message: Detections) -> FloatArray:
-    """Return the ownship's believed pose at each entry, (6, entries); NaN where none is stated."""
+def ownship_poses_of_entries(message: Detections) -> FloatArray:
+    """Return the ownship's pose as it believed it at each entry, (6, entries); NaN where none."""
     columns = message.pose_columns()
     if columns:
         return np.stack(list(columns.values()))
     return np.full((len(POSE), len(message.target)), np.nan)
 
 
-def velocities(message: Detections) -> FloatArray:
+def ownship_velocities_of_entries(message: Detections) -> FloatArray:
     """Return the ownship's velocity at each entry, (3, entries); NaN where none is stated."""
     velocity = message.own_velocity_columns()
     if velocity is None:
@@ -264,7 +266,7 @@ def velocities(message: Detections) -> FloatArray:
 
 
 def reported_error_columns(message: Detections) -> FloatArray:
-    """Return targets' reported errors for each entry, (`TOLD`, entries); NaN where none."""
+    """Return each entry's errors as its target reports them, a row per name of `TOLD`, or NaN."""
     if message.told_by_target is None:
         return np.full((len(TOLD), len(message.target)), np.nan)
     return np.stack([message.told_by_target[name] for name in TOLD])
@@ -288,7 +290,7 @@ class _Entries:
             start += len(new.message.target)
         self._entries = start
 
-    def best_sources(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
+    def best_sensor_and_entry(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
         """Return for each row the sensor and the entry that it takes values from, -1 for none; a
         later sensor in ``ranked`` wins.
 
@@ -319,7 +321,7 @@ class _Entries:
 def latest_in_gate(
     arrivals: Arrivals, asked: RunTicks, targets: IntArray, gate_ticks: int
 ) -> IntArray:
-    """Return by instant and target its latest entry that arrived at most ``gate_ticks`` before.
+    """Return each target's latest entry up to ``gate_ticks`` before each instant; -1 if none.
 
     `asked` (fused,) are instants and `targets` (fused,) whose entries are wanted; -1 where a sensor
     has none.
@@ -347,7 +349,7 @@ def latest_in_gate(
 def single_entry_rows(
     taken: Mapping[str, tuple[IntArray, IntArray]], sensors: Iterable[str]
 ) -> tuple[IntArray, dict[str, IntArray]]:
-    """Return the rows and each sensor's entries of fused detections of a single entry.
+    """Return fused detections of one entry each: their rows, and by sensor the entry or -1.
 
     `taken` has by sensor the rows and the entries; they follow each other sensor by sensor.
     """

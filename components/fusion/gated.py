@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 from pydantic import Field
 
-from components.fusion.fusion_block import Fusion, largest_delay_s, poses
+from components.fusion.fusion_block import Fusion, largest_delay_s, ownship_poses_of_entries
 from components.fusion.ladder import FUSION_LADDER
 from components.geometry import (
     angle_by_haversine,
@@ -43,7 +43,9 @@ class Entries(NamedTuple):
         """Return the entries of all detections that arrived from a sensor."""
         message, row = arrivals.message, arrivals.message.row_of_entries
         made = message.measured_ticks()
-        return cls(message, message.run[row], made, arrivals.tick[row], poses(message))
+        return cls(
+            message, message.run[row], made, arrivals.tick[row], ownship_poses_of_entries(message)
+        )
 
 
 class Gates(NamedTuple):
@@ -168,7 +170,7 @@ class Gated(Fusion):
     ladders = (FUSION_LADDER,)
 
     def window_s(self) -> Any:
-        """Return ``time_gate_s``."""
+        """Return ``time_gate_s``, the age (s) up to which detections can be fused with new ones."""
         return self.p.time_gate_s
 
     def setup(self) -> None:
@@ -219,7 +221,7 @@ class Gated(Fusion):
         in_order = self._sort_order(rows, anchors, arrivals)
         row = np.concatenate(rows)[in_order]
         entries = {name: np.concatenate(parts)[in_order] for name, parts in gathered.items()}
-        target = self._targets(entries, arrivals, order)
+        target = self._true_targets(entries, arrivals, order)
         return self.combine(wake.instants, row, target, arrivals, entries)
 
     def _sort_order(
@@ -237,7 +239,7 @@ class Gated(Fusion):
         rank = np.repeat(np.arange(len(anchors)), [len(mine) for _, mine in anchors])
         return np.lexsort((*measured, rank, np.concatenate(rows)))
 
-    def _targets(
+    def _true_targets(
         self, entries: dict[str, IntArray], arrivals: dict[str, Arrivals], order: list[str]
     ) -> IntArray:
         """Return each fused detection's true target, which is recorded but decides nothing."""

@@ -13,7 +13,9 @@ from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
 
 
-def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
+def fused_line_of_sight_errors(
+    block: Component, wake: Wake, reference: Component
+) -> dict[str, AnyArray]:
     """Return fused lines of sight's errors by row and target: direction (mrad), range (m).
 
     Rungs fuse other rows, so they are compared with the truth and not row by row with each other.
@@ -35,9 +37,12 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
 
 
 def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the same errors for the reference block, at the given cells (row, target)."""
+    """Return the reference block's fused lines of sight's errors, at given cells (row, target)."""
     row, target = cells.T
-    return {name: values[row, target] for name, values in measure(block, wake, block).items()}
+    return {
+        name: values[row, target]
+        for name, values in fused_line_of_sight_errors(block, wake, block).items()
+    }
 
 
 def _errors_to_truth(values: AnyArray, reference: AnyArray) -> FloatArray:
@@ -59,7 +64,7 @@ FUSION_LADDER = Ladder(
         Quantity("range", "m", _errors_to_truth),
         Quantity("direction", "mrad", _errors_to_truth),
     ),
-    measure,
+    fused_line_of_sight_errors,
     truth,
     clears=("model",),
 )  # fmt: skip

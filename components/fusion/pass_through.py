@@ -26,7 +26,7 @@ class PassThrough(Fusion):
     puts_together = False
 
     def window_s(self) -> Any:
-        """Return 0: nothing waits for anything."""
+        """Return 0 (s): no detection is kept to be fused with a later one."""
         return 0
 
     def run(self, wake: Wake) -> FusedDetections | None:

@@ -15,7 +15,7 @@ from components.messages.detections import SensorOffer
 from components.messages.false_detections import FALSE_TARGET
 from components.messages.fused import FusedDetections
 from dsa_des.arrays.run_ticks import last_position_at_or_before, positions_with_found_mask
-from dsa_des.arrays.sorted_union import sorted_union
+from dsa_des.arrays.sorted_union import sorted_union_and_positions
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import NonNegativeRational, Parameters, Producer
 from dsa_des.block.wake import Arrivals, Wake
@@ -51,17 +51,21 @@ class PickBest(Fusion):
         ]
 
     def window_s(self) -> Any:
-        """Return ``coincidence_s``."""
+        """Return ``coincidence_s``, the age (s) up to which detections can be fused with new
+        ones.
+        """
         return self.p.coincidence_s
 
     def warnings(self) -> list[str]:
         """Return a warning if no two sensors ever report within ``coincidence_s`` of each other."""
         clocks = [
-            clock for one in self.context.producers if (clock := _report_clock(one)) is not None
+            clock
+            for one in self.context.producers
+            if (clock := _first_report_and_period_s(one)) is not None
         ]
         if len(clocks) < 2 or len(clocks) < len(self.context.producers):
             return super().warnings()
-        apart_s = min(closest_clock_distance_s(*pair) for pair in combinations(clocks, 2))
+        apart_s = min(least_tick_distance_s(*pair) for pair in combinations(clocks, 2))
         if apart_s <= self.p.coincidence_s:
             return super().warnings()
         return [
@@ -81,7 +85,7 @@ class PickBest(Fusion):
             _instant_target_keys(new, wake, width, of)
             for new, of in zip(arrivals.values(), true, strict=True)
         ]
-        union, positions = sorted_union(keys)
+        union, positions = sorted_union_and_positions(keys)
         row = union // width
         target = union - row * width
         if self.gate_ticks:
@@ -95,14 +99,16 @@ class PickBest(Fusion):
             for entry, at, of in zip(entries.values(), positions, true, strict=True):
                 entry[at] = np.arange(len(at)) if of is None else of
         if any(of is not None for of in true):
-            rows, alone = single_entry_rows(self._false_alarms(arrivals, wake), arrivals)
+            rows, alone = single_entry_rows(
+                self._false_alarm_rows_and_entries(arrivals, wake), arrivals
+            )
             order = np.argsort(np.concatenate([row, rows]), kind="stable")
             row = np.concatenate([row, rows])[order]
             target = np.append(target, np.full(len(rows), FALSE_TARGET))[order]
             entries = {n: np.append(entry, alone[n])[order] for n, entry in entries.items()}
         return self.combine(wake.instants, row, target, arrivals, entries)
 
-    def _false_alarms(
+    def _false_alarm_rows_and_entries(
         self, arrivals: Mapping[str, Arrivals], wake: Wake
     ) -> dict[str, tuple[IntArray, IntArray]]:
         """Return by sensor, in order of rank, rows and entries of false alarms arrived now."""
@@ -117,7 +123,7 @@ class PickBest(Fusion):
         return result
 
 
-def _report_clock(sensor: Producer) -> tuple[Fraction, Fraction] | None:
+def _first_report_and_period_s(sensor: Producer) -> tuple[Fraction, Fraction] | None:
     """Return a sensor's first report time (s) and its period, or None if it is irregular."""
     offer = sensor.offer
     if not isinstance(offer, SensorOffer) or offer.clock is None:
@@ -128,7 +134,7 @@ def _report_clock(sensor: Producer) -> tuple[Fraction, Fraction] | None:
     return clock.offset_s + sensor.latest_s, clock.period_s
 
 
-def closest_clock_distance_s(
+def least_tick_distance_s(
     one: tuple[Fraction, Fraction], other: tuple[Fraction, Fraction]
 ) -> Fraction:
     """Return the least time between ticks of two clocks, each (first instant, period), s."""

@@ -7,7 +7,7 @@ from typing import Self
 import numpy as np
 
 from components.messages.detections import Detections
-from dsa_des.arrays.entries import select_entries
+from dsa_des.arrays.entries import selected_offsets_and_indices
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.wake import Arrivals
@@ -23,7 +23,7 @@ class Recent:
     used: Mapping[str, BoolArray] = field(default_factory=dict)
     kept: Mapping[str, slice | IntArray] = field(default_factory=dict)
 
-    def add_arrivals(
+    def joined_and_kept_arrivals(
         self, arrivals: Mapping[str, Arrivals], first_run: int, keep_ticks: int
     ) -> tuple[dict[str, Arrivals], Self]:
         """Return every sensor's recent and new rows joined, and those to keep as recent.
@@ -43,7 +43,7 @@ class Recent:
         seen, kept = {}, {}
         for name, all_seen in together.items():
             young = np.flatnonzero(all_seen.tick >= latest - keep_ticks)
-            kept[name] = select_entries(all_seen.message.offsets, young)[1]
+            kept[name] = selected_offsets_and_indices(all_seen.message.offsets, young)[1]
             seen[name], _ = _select_rows(all_seen, used[name], young)
         return together, type(self)(seen, used, kept)
 
@@ -72,7 +72,7 @@ class Recent:
 def _select_rows(
     seen: Arrivals, used: BoolArray, rows: slice | IntArray
 ) -> tuple[Arrivals, BoolArray]:
-    _, which = select_entries(seen.message.offsets, rows)
+    _, which = selected_offsets_and_indices(seen.message.offsets, rows)
     return Arrivals(seen.source, seen.instants.take(rows), seen.message.take(rows)), used[which]
 
 
@@ -91,10 +91,10 @@ def _concatenate_by_run(parts: list[tuple[Arrivals, BoolArray]]) -> tuple[Arriva
     return (whole, used) if order is None else _select_rows(whole, used, order)
 
 
-def split_used_rows(
+def whole_rows_and_new_detections(
     row: IntArray, parts: IntArray, made: IntArray, used: BoolArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return which fused rows are unused and of one instant, and the others' unused detections.
+    """Return fused rows all new and of one instant, and the others' new detections (row, index).
 
     A tracker that took a detection twice, or two of different instants for one of one, would be
     too sure. So a fused row counts as it is if all that it is made of is new and was measured at

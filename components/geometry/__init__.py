@@ -10,8 +10,8 @@ from components.geometry.angles import (
     TWO_PI,
     Vector,
     direction_angle,
-    heading_from_deg,
-    local_axes,
+    east_north_up_axes,
+    heading_rad_from_deg,
     longitude_difference_deg,
     longitude_difference_rounded,
     normal_to_degrees,
@@ -32,12 +32,12 @@ from components.geometry.attitude import (
     body_angles,
     body_angles_unchecked,
     body_to_ned,
+    components_in_turned_axes,
     line_of_sight_in_target_axes,
     ned_to_body,
     ned_to_body_unchecked,
     normalize_azimuths,
     relative_attitude,
-    turn_axes,
     unit_vector,
     unit_vector_unchecked,
 )
@@ -63,13 +63,13 @@ from components.geometry.ellipsoid import (
     FLATTENING,
     LARGEST_OFFSET_M,
     SEMI_MAJOR_AXIS_M,
+    azimuth_elevation_range_from_neu,
     enu_to_geodetic,
     line_of_sight,
     line_of_sight_ned,
-    north_east_up,
+    north_east_up_offsets_m,
     radii_of_curvature,
     slant_range_m,
-    spherical_from_enu,
 )
 from components.geometry.field_of_view import FieldOfView, sector_width_rad, unwrap_sector
 from components.geometry.meridians import (
@@ -79,8 +79,8 @@ from components.geometry.meridians import (
     rotate_to_meridian,
 )
 from components.geometry.sensor_axes import (
+    body_angles_of_offsets,
+    body_angles_of_sight_line,
     rotate_variances,
-    sensor_angles,
-    sensor_angles_of_offsets,
 )
 from components.geometry.state import POSE_FIELDS, POSITION_FIELDS, TrajectoryState

@@ -17,7 +17,7 @@ DEG_PER_RAD = 180.0 / np.pi
 RAD_PER_DEG = np.pi / 180.0
 
 
-def local_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[Vector, Vector, Vector]:
+def east_north_up_axes(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[Vector, Vector, Vector]:
     """Return the unit vectors east, north and up at a position (degrees), in Earth-centred axes.
 
     Each is its (x, y, z) components; up is the ellipsoid normal.
@@ -76,7 +76,7 @@ def wrap_pi(angle_rad: npt.ArrayLike) -> FloatArray:
 
 
 def wrap_pi_unchecked(angle: FloatArray) -> FloatArray:
-    """`wrap_pi` for a contiguous array that is known to be finite."""
+    """Return angles wrapped into (-pi, pi], unchecked: for a contiguous array of finite values."""
     result = angle + 0.0
     if angle.min(initial=0.0) > -np.pi and angle.max(initial=0.0) <= np.pi:
         return result
@@ -160,7 +160,7 @@ def remainder(angle: FloatArray, turn: float) -> FloatArray:
     return np.where(rest >= turn, 0.0, rest)
 
 
-def heading_from_deg(heading_deg: float) -> float:
+def heading_rad_from_deg(heading_deg: float) -> float:
     """Turn a heading in degrees, any number of turns, into radians in [0, 2 pi]."""
     return math.radians(heading_deg % 360.0)
 
@@ -235,7 +235,7 @@ def direction_angle(across: FloatArray, along: FloatArray) -> FloatArray:
 def longitude_difference_deg(
     lon1_deg: npt.ArrayLike, lon2_deg: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Find lon2 - lon1 in degrees, wrapped and without any rounding error.
+    """Return lon2 - lon1 (deg) wrapped into [-180, 180), and the rounding error left out of it.
 
     Parameters
     ----------
@@ -303,7 +303,9 @@ def _two_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _wrap_sum(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return total + low wrapped into [-180, 180) degrees, and total less its whole turns."""
+    """Return total + low wrapped into [-180, 180) degrees, and total less its nearest whole
+    turns.
+    """
     rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
     difference = rest + low
     over = (difference >= 180.0) | (difference < -180.0)

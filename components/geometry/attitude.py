@@ -44,7 +44,7 @@ def ned_to_body(
         Components along nose, right wing and down through the floor, the same unit. The length
         is kept to 1e-15 of itself, also there and back (measured 5e-16 and 6e-16).
     """
-    shape, arrays = check_arguments(
+    shape, arrays = common_shape_and_arrays(
         north=north, east=east, down=down, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
     x, y, z = broadcast_results(shape, *ned_to_body_unchecked(*arrays))
@@ -73,19 +73,19 @@ def body_to_ned(
     -------
     north, east, down : ndarray
     """
-    shape, (bx, by, bz, yaw, pitch, roll) = check_arguments(
+    shape, (bx, by, bz, yaw, pitch, roll) = common_shape_and_arrays(
         x=x, y=y, z=z, yaw_rad=yaw_rad, pitch_rad=pitch_rad, roll_rad=roll_rad
     )
-    level_y, level_z = turn_axes(by, bz, -roll)
-    down, level_x = turn_axes(level_z, bx, -pitch)
-    north, east = turn_axes(level_x, level_y, -yaw)
+    level_y, level_z = components_in_turned_axes(by, bz, -roll)
+    down, level_x = components_in_turned_axes(level_z, bx, -pitch)
+    north, east = components_in_turned_axes(level_x, level_y, -yaw)
     north, east, down = broadcast_results(shape, north, east, down)
     return north, east, down
 
 
 @np.errstate(under="ignore")
 def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vector:
-    """Return the unit vector of a direction, in NED.
+    """Return the unit vector (north, east, down) of a direction (rad).
 
     Parameters
     ----------
@@ -97,7 +97,7 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vec
     north, east, down : ndarray
         Length 1. From body angles instead of NED angles it gives x, y, z in body axes.
     """
-    shape, arrays = check_arguments(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
+    shape, arrays = common_shape_and_arrays(azimuth_rad=azimuth_rad, elevation_rad=elevation_rad)
     north, east, down = broadcast_results(shape, *unit_vector_unchecked(*arrays))
     return north, east, down
 
@@ -106,7 +106,7 @@ def unit_vector(azimuth_rad: npt.ArrayLike, elevation_rad: npt.ArrayLike) -> Vec
 def body_angles(
     x: npt.ArrayLike, y: npt.ArrayLike, z: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
-    """Find azimuth and elevation of a vector in body axes.
+    """Return azimuth, elevation (rad) of a vector with components along nose, right wing and down.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def body_angles(
     p = atan2(y, x), q = atan2(-z, hypot(x, y)): no domain error and full accuracy near ±90
     degrees, where the asin of thesis eq. 5 loses half the digits.
     """
-    shape, arrays = check_arguments(x=x, y=y, z=z)
+    shape, arrays = common_shape_and_arrays(x=x, y=y, z=z)
     wide = (np.ascontiguousarray(np.broadcast_to(a, shape or (1,))) for a in arrays)
     p, q = broadcast_results(shape, *body_angles_unchecked(*wide))
     return p, q
@@ -153,7 +153,7 @@ def relative_attitude(
         yaw - azimuth (0 when it flies away from us), elevation - pitch and elevation - roll, all
         wrapped into (-pi, pi].
     """
-    shape, (azimuth, elevation, yaw, pitch, roll) = check_arguments(
+    shape, (azimuth, elevation, yaw, pitch, roll) = common_shape_and_arrays(
         azimuth_rad=azimuth_rad,
         elevation_rad=elevation_rad,
         target_yaw_rad=target_yaw_rad,
@@ -222,23 +222,23 @@ def aspect_angles(
 
 
 def unit_vector_unchecked(azimuth: Any, elevation: Any) -> Vector:
-    """`unit_vector` for arrays of finite doubles."""
+    """Return unit vectors (north, east, down) of directions (rad): arrays of finite doubles."""
     level = np.cos(elevation)
     return level * np.cos(azimuth), level * np.sin(azimuth), -np.sin(elevation)
 
 
 def ned_to_body_unchecked(n: Any, e: Any, d: Any, yaw: Any, pitch: Any, roll: Any) -> Vector:
-    """`ned_to_body` for arrays of finite doubles."""
-    level_x, level_y = turn_axes(n, e, yaw)
-    z, x = turn_axes(d, level_x, pitch)
-    y, z = turn_axes(level_y, z, roll)
+    """Rotate vectors from local NED into body axes, unchecked: for arrays of finite doubles."""
+    level_x, level_y = components_in_turned_axes(n, e, yaw)
+    z, x = components_in_turned_axes(d, level_x, pitch)
+    y, z = components_in_turned_axes(level_y, z, roll)
     return x, y, z
 
 
 def body_angles_unchecked(
     x: FloatArray, y: FloatArray, z: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """`body_angles` for contiguous arrays of one shape."""
+    """Return azimuth, elevation (rad) of body-axes vectors: contiguous arrays of one shape."""
     level = np.hypot(x, y)
     return normalize_azimuths(np.arctan2(y, x), z, level), np.arctan2(0.0 - z, level)
 
@@ -251,13 +251,15 @@ def normalize_azimuths(azimuth: FloatArray, z: FloatArray, level: FloatArray) ->
     return azimuth
 
 
-def turn_axes(a: FloatArray, b: FloatArray, angle: FloatArray) -> tuple[FloatArray, FloatArray]:
+def components_in_turned_axes(
+    a: FloatArray, b: FloatArray, angle: FloatArray
+) -> tuple[FloatArray, FloatArray]:
     """Return a plane vector (a, b) in axes that are turned by the angle from a towards b."""
     sine, cosine = sine_and_cosine(angle)
     return cosine * a + sine * b, cosine * b - sine * a
 
 
-def check_arguments(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
+def common_shape_and_arrays(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
     """Check named arguments and return their common shape, and each as a float array with at least
     one axis.
     """

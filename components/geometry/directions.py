@@ -24,7 +24,7 @@ def angle_between(
     second_azimuth_rad: ArrayLike,
     second_elevation_rad: ArrayLike,
 ) -> Any:
-    """Return the angle between two directions, exact at every separation.
+    """Return the angle (rad, 0 to pi) between two directions, exact at every separation.
 
     atan2(|a × b|, a·b) of the two unit vectors, with cross and dot product written in differences
     of the angles so that a small separation keeps its digits: azimuths that wrap and directions

@@ -41,9 +41,13 @@ from components.geometry.angles import (
     longitude_difference_rounded,
     wrap_negative_to_positive_rad,
 )
-from components.geometry.ellipsoid import north_east_up, radii_of_curvature, spherical_from_enu
+from components.geometry.ellipsoid import (
+    azimuth_elevation_range_from_neu,
+    north_east_up_offsets_m,
+    radii_of_curvature,
+)
 from components.geometry.sensor_axes import MODELS as ATTITUDE_MODELS
-from components.geometry.sensor_axes import sensor_angles, sensor_angles_of_offsets
+from components.geometry.sensor_axes import body_angles_of_offsets, body_angles_of_sight_line
 from dsa_des.arrays.types import FloatArray
 
 METRES_PER_DEGREE = 111195.0
@@ -113,7 +117,7 @@ def east_north_m(
 
 
 def find_plane_scale(lat_deg: FloatArray, alt_m: FloatArray) -> FloatArray:
-    """Find how many metres over the ground a metre in that plane is, east and north (2, n)."""
+    """Return metres over the ground per metre in `east_north_m`'s plane, east and north (2, n)."""
     meridian_m, prime_vertical_m = radii_of_curvature(lat_deg)
     return (np.stack([prime_vertical_m, meridian_m]) + alt_m) / RADIUS_M
 
@@ -178,7 +182,7 @@ def geodesic_line_of_sight(
     validate: bool = True,
     backend: str = "geographiclib",
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find azimuth, elevation and range of a target from its geodesic distance and altitude.
+    """Return a target's azimuth, elevation (rad), range (m) by geodesic distance and altitude.
 
     Parameters
     ----------
@@ -265,7 +269,7 @@ _OFFSETS: dict[str, Callable[..., tuple[FloatArray, FloatArray, FloatArray]]] = 
     "flat_earth": flat_earth_offsets,
     "local_radii": local_radii_offsets,
     "daidalus_sphere": daidalus_sphere_offsets,
-    "ellipsoid": north_east_up,
+    "ellipsoid": north_east_up_offsets_m,
 }
 
 EARTH_MODELS = ("flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid")
@@ -328,7 +332,7 @@ class LineOfSight:
         lon_deg: Any,
         alt_m: Any,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Find azimuth, elevation and slant range in the NED frame, as `line_of_sight` does."""
+        """Return azimuth, elevation (rad), slant range (m) in the NED frame, as `line_of_sight`."""
         coordinates = own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m
         return self._in_ned(coordinates, validate=True)
 
@@ -344,12 +348,15 @@ class LineOfSight:
         attitude = own.yaw_rad, own.pitch_rad, own.roll_rad
         if self._offsets is None or self.attitude != "exact":
             seen = self._in_ned(coordinates, validate=False)
-            body = sensor_angles(*seen[:2], *attitude, model=self.attitude, validate=False)
+            body = body_angles_of_sight_line(
+                *seen[:2], *attitude, model=self.attitude, validate=False
+            )
             return SeenFromOwnship(*seen, *body)
         with np.errstate(under="ignore"):  # what is too small for a double is zero
             offsets = self._offsets(*coordinates)
             return SeenFromOwnship(
-                *spherical_from_enu(*offsets), *sensor_angles_of_offsets(*offsets, *attitude)
+                *azimuth_elevation_range_from_neu(*offsets),
+                *body_angles_of_offsets(*offsets, *attitude),
             )
 
     def _in_ned(
@@ -359,6 +366,6 @@ class LineOfSight:
             return geodesic_line_of_sight(*coordinates, validate=validate)
         arrays, shape = check_positions(*coordinates, validate=validate)
         with np.errstate(under="ignore"):  # offsets below 1e-150 m square to zero
-            seen = spherical_from_enu(*self._offsets(*arrays))
+            seen = azimuth_elevation_range_from_neu(*self._offsets(*arrays))
         azimuth, elevation, range_m = broadcast_results(shape, *seen)
         return azimuth, elevation, range_m

@@ -9,7 +9,7 @@ from components.arguments.checks import broadcast_results, check_positions
 from components.geometry.angles import (
     RAD_PER_DEG,
     direction_angle,
-    local_axes,
+    east_north_up_axes,
     longitude_difference_rounded,
     slope_angle,
     wrap_longitude_deg,
@@ -34,7 +34,7 @@ def line_of_sight(
     *,
     validate: bool = True,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find azimuth, elevation and slant range of a target, exact on the WGS-84 ellipsoid.
+    """Return a target's azimuth, elevation (rad), slant range (m), exact on the WGS-84 ellipsoid.
 
     Parameters
     ----------
@@ -70,7 +70,9 @@ def line_of_sight(
     )
     # Offsets below 1e-150 m square to zero, which is right to every digit asked for.
     with np.errstate(under="ignore"):
-        azimuth, elevation, slant_range = spherical_from_enu(*north_east_up(*arrays))
+        azimuth, elevation, slant_range = azimuth_elevation_range_from_neu(
+            *north_east_up_offsets_m(*arrays)
+        )
     azimuth, elevation, slant_range = broadcast_results(shape, azimuth, elevation, slant_range)
     return azimuth, elevation, slant_range
 
@@ -83,7 +85,7 @@ def slant_range_m(
     lon_deg: npt.ArrayLike,
     alt_m: npt.ArrayLike,
 ) -> FloatArray:
-    """Find the slant range of a target alone, to the bit that of `line_of_sight`.
+    """Return a target's slant range (m) alone, equal to the bit to that of `line_of_sight`.
 
     Arguments are those of `line_of_sight`, in bounds: their values are not checked.
     """
@@ -91,7 +93,7 @@ def slant_range_m(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, False
     )
     with np.errstate(under="ignore"):
-        north, east, up = north_east_up(*arrays)
+        north, east, up = north_east_up_offsets_m(*arrays)
         (range_m,) = broadcast_results(shape, np.sqrt(north * north + east * east + up * up))
     return range_m
 
@@ -150,7 +152,7 @@ def line_of_sight_ned(
         own_lat_deg, own_lon_deg, own_alt_m, lat_deg, lon_deg, alt_m, validate
     )
     with np.errstate(under="ignore"):
-        north, east, up = north_east_up(*arrays)
+        north, east, up = north_east_up_offsets_m(*arrays)
     north, east, down = broadcast_results(shape, north, east, 0.0 - up)
     return north, east, down
 
@@ -163,10 +165,10 @@ def radii_of_curvature(lat_deg: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
     return prime_vertical * (1.0 - ECCENTRICITY_SQUARED) / w_squared, prime_vertical
 
 
-def spherical_from_enu(
+def azimuth_elevation_range_from_neu(
     north: FloatArray, east: FloatArray, up: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Turn north, east, up offsets (m, one axis up) into azimuth, elevation and range.
+    """Return azimuth, elevation (rad), range (m) of north, east, up offsets (m) in arrays.
 
     They broadcast; the azimuth is in [0, 2 pi), 0 where there is no horizontal offset.
     """
@@ -181,7 +183,7 @@ def spherical_from_enu(
     return wrap_negative_to_positive_rad(direction_angle(east, north)), elevation, slant_range
 
 
-def north_east_up(
+def north_east_up_offsets_m(
     lat1: FloatArray,
     lon1: FloatArray,
     alt1: FloatArray,
@@ -298,7 +300,7 @@ def enu_to_geodetic(
     reference_lon_deg: npt.ArrayLike,
     reference_alt_m: npt.ArrayLike,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Find the geodetic position of points given in the tangent frame of a reference point.
+    """Return latitude, longitude (deg), altitude (m) of points east, north, up (m) of a reference.
 
     Parameters
     ----------
@@ -340,13 +342,13 @@ def enu_to_geodetic(
         for part in (reference_lat_deg, reference_lon_deg, reference_alt_m)
     )
     lat, lon, alt = _first_guess(east, north, up, lat0, lon0, alt0)
-    reference_axes = local_axes(lat0, lon0)
+    reference_axes = east_north_up_axes(lat0, lon0)
     got_north, got_east, got_down = line_of_sight_ned(
         lat0, lon0, alt0, lat, lon, alt, validate=False
     )
     error = (east - got_east, north - got_north, up + got_down)
     vector = [sum(e * a[i] for e, a in zip(error, reference_axes, strict=True)) for i in (0, 1, 2)]
-    axes = local_axes(lat, lon)
+    axes = east_north_up_axes(lat, lon)
     d_east, d_north, d_up = (sum(v * a[i] for i, v in enumerate(vector)) for a in axes)
     meridian, prime_vertical = radii_of_curvature(lat)
     to_axis = (prime_vertical + alt) * np.cos(np.radians(lat))

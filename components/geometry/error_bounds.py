@@ -95,7 +95,7 @@ class Envelope:
                 raise ValueError(f"{name} is {pair}: it must hold two numbers, the lower first")
 
 
-def flat_earth_error(envelope: Envelope) -> Interval | None:
+def flat_earth_error_bounds(envelope: Envelope) -> Interval | None:
     """Return the flat Earth's largest direction (rad) and relative range error; None if unknown."""
     meridian, prime_vertical = _radius_ranges(*_abs_latitude_range(envelope.own_lat_deg))
     low_alt, high_alt = envelope.own_alt_m
@@ -103,7 +103,7 @@ def flat_earth_error(envelope: Envelope) -> Interval | None:
         return None
     most = max(1.0, _METRES_PER_RAD / (meridian[0] + low_alt))
     least = min(1.0, _METRES_PER_RAD / (prime_vertical[1] + high_alt))
-    local = local_radii_error(envelope, envelope.range_max_m / least)
+    local = local_radii_error_bounds(envelope, envelope.range_max_m / least)
     if local is None:
         return None
     angle, relative = local
@@ -113,7 +113,7 @@ def flat_earth_error(envelope: Envelope) -> Interval | None:
     ) + relative / least
 
 
-def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
+def local_radii_error_bounds(envelope: Envelope, range_m: float) -> Interval | None:
     """Return the largest direction error (rad) and relative range error of the local-radii model up
     to a range, or None if no bound is known.
     """
@@ -139,7 +139,7 @@ def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
     m_high, m_low = m_max + high_alt, m_min + low_alt  # of M + h
     wide, long = s / rho, s / r_min  # largest a and b
     drop = 0.5 * max(m_high * wide**2, cos_max * r_max * long**2)
-    rise = min(_largest_rise(envelope), range_m + drop)
+    rise = min(_largest_altitude_difference_m(envelope), range_m + drop)
     slope = 1.5 * m_max * ECCENTRICITY_SQUARED * _largest_sin_2lat(low, high)
     slope /= 1.0 - ECCENTRICITY_SQUARED * sin_max**2
     thick = max(high_alt, -low_alt)
@@ -175,7 +175,7 @@ def local_radii_error(envelope: Envelope, range_m: float) -> Interval | None:
     return math.asin(off / range_m), along / ((range_m - 0.5 * off) * range_m)
 
 
-def geodesic_error(envelope: Envelope) -> Interval | None:
+def geodesic_error_bounds(envelope: Envelope) -> Interval | None:
     """Return the largest direction error (rad) and the largest relative range error of the geodesic
     model, or None if no bound is known.
     """
@@ -194,8 +194,10 @@ def geodesic_error(envelope: Envelope) -> Interval | None:
     # The normal's turn off the mean curvature and off the plane, and what bends within it.
     level = thick * (k_max - k_min) / math.sqrt(2.0) * s
     level += k_max**2 * s**3 / 6.0 * (1.0 + thick * k_max)
-    rise = min(_largest_rise(envelope), range_m + drop)
-    rest = _bound_by_offsets(level, drop, rise, range_m, least * range_m - math.hypot(level, drop))
+    rise = min(_largest_altitude_difference_m(envelope), range_m + drop)
+    rest = _direction_and_range_bounds(
+        level, drop, rise, range_m, least * range_m - math.hypot(level, drop)
+    )
     if rest is None:
         return None
     angle, relative = rest
@@ -204,7 +206,7 @@ def geodesic_error(envelope: Envelope) -> Interval | None:
     return angle + _largest_direction_change_rad(least, most), stretch * off / least + relative
 
 
-def _bound_by_offsets(
+def _direction_and_range_bounds(
     level_m: float, drop_m: float, rise_m: float, range_m: float, shortest_m: float
 ) -> Interval | None:
     """Return direction (rad) and relative range error bounds from offset errors (m), or None.
@@ -231,7 +233,7 @@ def _largest_direction_change_rad(least: float, most: float) -> float:
     return math.asin((most - least) / (most + least))
 
 
-def _largest_rise(envelope: Envelope) -> float:
+def _largest_altitude_difference_m(envelope: Envelope) -> float:
     own, target = envelope.own_alt_m, envelope.target_alt_m
     return max(target[1] - own[0], own[1] - target[0])
 
@@ -272,8 +274,8 @@ def _largest_sin_2lat(low_deg: float, high_deg: float) -> float:
 __all__ = [
     "Envelope",
     "ErrorBound",
-    "attitude_error_rad",
-    "azimuth_error_rad",
+    "attitude_error_bound_rad",
+    "azimuth_error_bound_rad",
     "error_bound",
 ]
 
@@ -327,23 +329,23 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
     elif envelope.range_max_m == 0.0:
         errors = (0.0, 0.0)
     elif earth == "geodesic":
-        errors = geodesic_error(envelope)
+        errors = geodesic_error_bounds(envelope)
     elif earth == "local_radii":
-        errors = local_radii_error(envelope, envelope.range_max_m)
+        errors = local_radii_error_bounds(envelope, envelope.range_max_m)
     elif earth == "daidalus_sphere":
         errors = None  # nobody has proven one: it is there to be compared with, not to be picked
     else:
-        errors = flat_earth_error(envelope)
+        errors = flat_earth_error_bounds(envelope)
     if errors is None or not math.isfinite(envelope.range_max_m):
         return ErrorBound(math.pi, math.pi, math.inf, math.inf)
     rounding = 0.0 if earth == "ellipsoid" else _ROUNDING
     direction, relative = errors[0] + rounding, errors[1] + rounding
     if attitude == "small_angle":
-        direction += attitude_error_rad(envelope.pitch_rad, envelope.roll_rad)
+        direction += attitude_error_bound_rad(envelope.pitch_rad, envelope.roll_rad)
     direction = min(direction, math.pi)
     return ErrorBound(
         direction,
-        azimuth_error_rad(direction, envelope.steepest_rad),
+        azimuth_error_bound_rad(direction, envelope.steepest_rad),
         relative * envelope.range_max_m,
         relative,
     )
@@ -370,8 +372,8 @@ def max_true_range_m(
     return reach_m / (1.0 - relative) if relative < _LARGEST_RELATIVE_ERROR else math.inf
 
 
-def attitude_error_rad(pitch_rad: float, roll_rad: float) -> float:
-    """Bound the direction error of the small-angle attitude (thesis eq. 4-5).
+def attitude_error_bound_rad(pitch_rad: float, roll_rad: float) -> float:
+    """Return a bound (rad) on the direction error of the small-angle attitude (thesis eq. 4-5).
 
     The exact rotation turns the direction by |pitch| and by |roll| at most; the small-angle form
     moves it along its own meridian by |pitch|. Both take a level aircraft to be the same.
@@ -379,7 +381,7 @@ def attitude_error_rad(pitch_rad: float, roll_rad: float) -> float:
     return min(math.pi, 2.0 * abs(pitch_rad) + abs(roll_rad))
 
 
-def azimuth_error_rad(direction_rad: float, steepest_rad: float) -> float:
+def azimuth_error_bound_rad(direction_rad: float, steepest_rad: float) -> float:
     """Return a bound (rad) on the azimuth error of a direction with an error of ``direction_rad``,
     at elevations up to the steepest.
     """

@@ -14,11 +14,11 @@ from components.geometry.attitude import (
     body_angles,
     body_angles_unchecked,
     body_to_ned,
-    check_arguments,
+    common_shape_and_arrays,
+    components_in_turned_axes,
     ned_to_body,
     ned_to_body_unchecked,
     normalize_azimuths,
-    turn_axes,
     unit_vector,
     unit_vector_unchecked,
 )
@@ -77,7 +77,7 @@ def rotate_variances(
 MODELS = ("exact", "small_angle")
 
 
-def sensor_angles(
+def body_angles_of_sight_line(
     azimuth_rad: npt.ArrayLike,
     elevation_rad: npt.ArrayLike,
     yaw_rad: npt.ArrayLike,
@@ -132,7 +132,7 @@ def sensor_angles(
     if not validate:
         given: tuple[Any, ...] = azimuth_rad, elevation_rad, yaw_rad, pitch_rad
         return _angle_by_angle(*given)
-    shape, (azimuth, elevation, yaw, pitch, _) = check_arguments(
+    shape, (azimuth, elevation, yaw, pitch, _) = common_shape_and_arrays(
         azimuth_rad=azimuth_rad,
         elevation_rad=elevation_rad,
         yaw_rad=yaw_rad,
@@ -157,7 +157,7 @@ def _angle_by_angle(
     return p, q
 
 
-def sensor_angles_of_offsets(
+def body_angles_of_offsets(
     north_m: FloatArray,
     east_m: FloatArray,
     up_m: FloatArray,
@@ -168,18 +168,18 @@ def sensor_angles_of_offsets(
     """Return azimuth and elevation (rad) in the ownship's body axes of what lies at some north,
     east, up offsets, without checks.
 
-    As `sensor_angles`, to the last digit or two, at a third to half of its cost: the direction need
-    not be taken apart into angles first. All are contiguous arrays of finite doubles, at least one
-    axis, the offsets (in the ownship's local frame) of the broadcast shape.
+    As `body_angles_of_sight_line`, to the last digit or two, at a third to half of its cost: the
+    direction need not be taken apart into angles first. All are contiguous arrays of finite
+    doubles, at least one axis, the offsets (in the ownship's local frame) of the broadcast shape.
     """
-    x, y = turn_axes(north_m, east_m, yaw_rad)
+    x, y = components_in_turned_axes(north_m, east_m, yaw_rad)
     z = 0.0 - up_m
     if first_row_if_stored_once(
         pitch_rad
     ).any():  # straight and level, as most fly most of the time, these change nothing
-        z, x = turn_axes(z, x, pitch_rad)
+        z, x = components_in_turned_axes(z, x, pitch_rad)
     if first_row_if_stored_once(roll_rad).any():
-        y, z = turn_axes(y, z, roll_rad)
+        y, z = components_in_turned_axes(y, z, roll_rad)
     level = x * x
     level += y * y
     np.sqrt(level, out=level)

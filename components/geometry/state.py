@@ -50,5 +50,5 @@ class TrajectoryState:
         return TrajectoryState(*(array.take(which) for array in self.arrays()))
 
     def arrays(self) -> tuple[np.ndarray, ...]:
-        """Return the seven arrays in the order of the fields."""
+        """Return latitude, longitude, altitude, yaw, pitch, roll and presence, an array each."""
         return tuple(getattr(self, name) for name in (*POSE_FIELDS, "present"))

@@ -169,7 +169,7 @@ class AltitudeConflicts:
                 span = self._detector.span(flight, self._intruder, time_s, time_s + 1.0)
                 self._seconds.append((time_s, due & nearly_equal(span.begin_s, time_s)))
 
-    def is_unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def is_in_or_behind_conflict(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Return a mask (n, k), True for altitudes whose flights conflict within the horizon."""
         end_s = np.minimum(self._horizon_end_s(horizon_s, self._level_s), self._lookahead_s)
         begin_s = np.maximum(from_s, self._level_s)
@@ -190,7 +190,7 @@ class AltitudeConflicts:
     def _horizon_end_s(self, horizon_s: Any, phase_s: FloatArray) -> FloatArray:
         return np.asarray(horizon_s if self._from_now else horizon_s + phase_s)
 
-    has_conflict_soon = is_unsafe
+    has_conflict_within_horizon = is_in_or_behind_conflict
 
     def has_conflict_before(self, until_s: FloatArray, horizon_s: FloatArray) -> BoolArray:
         """Return a mask (n, k), True for altitudes whose flights conflict before a time (n, 1)."""

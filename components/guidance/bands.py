@@ -22,7 +22,7 @@ from components.guidance.intervals import (
 )
 from components.guidance.manoeuvre_kinds import ManoeuvreKind, manoeuvres_of_kind
 from components.guidance.recovery import Recovery, find_recoveries, recovery_cylinder
-from components.guidance.regions import GuidedIntruders, Regions, intervals_of
+from components.guidance.regions import GuidedIntruders, Regions, clear_intervals_of_row
 from components.guidance.situation import State
 from components.well_clear.detection import Bounds, select_bounds
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
@@ -38,7 +38,7 @@ class Resolution(NamedTuple):
     prefers_high: bool  # Whether the right or upper one is nearer, or no farther
 
 
-def resolution(
+def nearest_values_outside_red(
     bands: list[Band], own_value: float, corrective_region: str, cyclic: bool
 ) -> Resolution | None:
     """Return the nearest values outside the red band around the own value; None if in none.
@@ -60,9 +60,9 @@ def resolution(
         # As near to north it lies in the first band, and no way to the left is found.
         if not red[0]:
             return None
-        low, high = -math.inf, _red_intervals(bands, red, (FULL_TURN,))[0][1]
+        low, high = -math.inf, _red_intervals_over_full_turns(bands, red, (FULL_TURN,))[0][1]
     else:
-        for low, high in _red_intervals(bands, red, turns):
+        for low, high in _red_intervals_over_full_turns(bands, red, turns):
             on_edge = is_same_value(low, own_value) or is_same_value(high, own_value)
             if low < own_value < high and not on_edge:
                 break
@@ -82,7 +82,7 @@ def resolution(
     return Resolution(low_end, high_end, bool(math.isfinite(high_end) and nearer))
 
 
-def _red_intervals(
+def _red_intervals_over_full_turns(
     bands: list[Band], red: list[bool], turns: tuple[float, ...]
 ) -> list[tuple[float, float]]:
     """Return the intervals in which bands are red without a gap, over some turns of a circle.
@@ -121,7 +121,9 @@ def _edge_as_direction(own_value: float, edge: float, none: float) -> float:
 
 
 def distance_to_edge(own_value: float, edge: float, cyclic: bool) -> float:
-    """Return how far an edge is from the own value, the shorter way round a circle."""
+    """Return how far an edge is from the own value, in their unit; if `cyclic`, both are angles in
+    radians and the shorter way round the circle counts.
+    """
     way = abs(edge - own_value)
     return min(way, FULL_TURN - way) if cyclic and math.isfinite(way) else way
 
@@ -143,14 +145,14 @@ class Guidance(NamedTuple):
     line: list[Band]
 
     @property
-    def recovers(self) -> bool:
+    def has_recovery(self) -> bool:
         """Return whether there is a recovery, so that free values are shown as RECOVERY bands."""
         return self.recovery is not None and self.recovery.time_s >= 0.0
 
 
 @dataclass(frozen=True)
 class GuidedIntruder:
-    """One intruder as guidance sees it."""
+    """One intruder as guidance needs it: its state, alerter, alert level and error bounds."""
 
     state: State  # In the ownship's plane
     alerter: Alerter
@@ -246,7 +248,7 @@ class _Part:
         self.saturated = np.zeros(len(on), dtype=bool)
         corrective = REGIONS.index(configuration["corrective_region"])
         for region in _PAINTED:
-            known, clear = regions.safe_values(region)
+            known, clear = regions.has_region_and_safe_values(region)
             layers.append((region, on & known, clear))
             stuck = on & known & ~regions.has_clear_interval(clear)
             if REGIONS.index(region) >= corrective:
@@ -299,7 +301,7 @@ class _Painter:
             free = [Band(least, most, "NONE")]
             return Guidance(own_value, free, None, free)
         layers: list[tuple[str, list[Interval], bool]] = [
-            (region, intervals_of(self._kind, row, clear), True)
+            (region, clear_intervals_of_row(self._kind, row, clear), True)
             for region, of_whom, clear in reversed(self._layers)
             if of_whom[row]
         ]
@@ -307,4 +309,4 @@ class _Painter:
             layers.append(("RECOVERY", ways, False))
         line = paint_bands(layers, least, most)
         result = Guidance(own_value, line, recovery, line)
-        return result._replace(bands=rename_to_recovery(line)) if result.recovers else result
+        return result._replace(bands=rename_to_recovery(line)) if result.has_recovery else result

@@ -14,7 +14,7 @@ from components.alert_configuration.configuration import (
     Deviations,
     uncertainty_bounds,
 )
-from components.guidance.bands import Guidance, guidance_of_many, resolution
+from components.guidance.bands import Guidance, guidance_of_many, nearest_values_outside_red
 from components.guidance.intervals import FULL_TURN, is_same_value
 from components.guidance.regions import GuidedIntruders
 from components.guidance.situation import State
@@ -23,7 +23,7 @@ from components.messages.alerts import (
     BAND_REGIONS,
     AlertLevels,
     GuidanceBands,
-    note_unreached_level,
+    unreached_level_notes,
 )
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, Producer, ScenePath
@@ -43,7 +43,7 @@ class ConfParameters(Parameters):
 
     @field_validator("conf", mode="after")
     @classmethod
-    def _readable(cls, value: Any) -> Any:
+    def _check_conf_readable(cls, value: Any) -> Any:
         read_conf(value)
         return value
 
@@ -136,7 +136,7 @@ def _intruders_of_entries(
 
 
 def _changes(guided: Guidance, region: str, cyclic: bool) -> Changes | None:
-    way = resolution(guided.bands, guided.own_value, region, cyclic)
+    way = nearest_values_outside_red(guided.bands, guided.own_value, region, cyclic)
     if way is None:
         return None
     if not cyclic:
@@ -160,8 +160,8 @@ def explain_no_steering(
     level: int, configuration: Configuration, alerter: Alerter, producers: Sequence[Producer]
 ) -> list[str]:
     """Return notes if no alert can reach a block's steering level, or no band can be red."""
-    said = note_unreached_level("level", level, producers)
-    if configuration.corrective_level(alerter) is None:
+    said = unreached_level_notes("level", level, producers)
+    if configuration.first_corrective_level(alerter) is None:
         said.append(
             f"no level of the alerter {alerter.name} has the region "
             f"{configuration['corrective_region']} (corrective_region) or a worse one: no band is "
@@ -209,7 +209,7 @@ class DaidalusGuidance(Component):
 
     def warnings(self) -> list[str]:
         """Return a warning where no alert reaches its level, or no level has bands."""
-        said = note_unreached_level("level", self.p.level, self.context.producers)
+        said = unreached_level_notes("level", self.p.level, self.context.producers)
         if all(level.region == "NONE" for level in self._alerter.levels):
             said.append(f"no level of the alerter {self._alerter.name} has a region: no bands")
         return said

@@ -27,7 +27,7 @@ class Interval(NamedTuple):
 
 
 def is_same_value(one: float, other: float) -> bool:
-    """Return whether two guidance values are equal.
+    """Return whether two guidance values are equal but for rounding: a few doubles apart at most.
 
     As `nearly_equal` of `components.well_clear.relative_motion`, for two numbers at a time: arrays
     are ten times as slow.
@@ -92,7 +92,7 @@ class Band(NamedTuple):
 def paint_bands(
     layers: list[tuple[str, list[Interval], bool]], least: float, most: float
 ) -> list[Band]:
-    """Return the bands from the lowest to the highest value."""
+    """Return bands from least to most; of layers (region, intervals, outside) later ones cover."""
     places = [least, most]
     for _, intervals, _ in layers:
         for interval in intervals:

@@ -143,7 +143,7 @@ class StepConflicts:
             lasts_s = steps.time_s + steps.step_time_s
             self._while_flown = overlaps_time(self._span, steps.time_s, lasts_s) & steps.there
 
-    def has_conflict_soon(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def has_conflict_within_horizon(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Return a mask (n, k), True for steps whose flight conflicts within the horizon after."""
         time_s = self._steps.time_s
         begin_s = np.maximum(from_s, time_s)
@@ -153,9 +153,9 @@ class StepConflicts:
         )
         return np.asarray(met & self._steps.there & np.asarray(from_s <= horizon_s))
 
-    def is_unsafe(self, from_s: Any, horizon_s: Any) -> BoolArray:
+    def is_in_or_behind_conflict(self, from_s: Any, horizon_s: Any) -> BoolArray:
         """Return a mask (n, k), True for steps in conflict or reached only through a conflict."""
-        met = self.has_conflict_soon(from_s, horizon_s)
+        met = self.has_conflict_within_horizon(from_s, horizon_s)
         if self._steps.instantaneous:
             return met
         first = np.ceil(from_s / self._steps.step_time_s)

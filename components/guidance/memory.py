@@ -5,7 +5,13 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from components.alert_configuration.configuration import REGIONS, Configuration
-from components.guidance.bands import Guidance, Resolution, distance_to_edge, is_red, resolution
+from components.guidance.bands import (
+    Guidance,
+    Resolution,
+    distance_to_edge,
+    is_red,
+    nearest_values_outside_red,
+)
 from components.guidance.intervals import (
     FULL_TURN,
     Band,
@@ -299,10 +305,10 @@ class ResolutionMemory:
             self._prefers_high, self._since_s = False, None
         elif not math.isfinite(high):
             if self._prefers_high:
-                self._switch(now_s, raw, shrinks)
+                self._prefer_other_side(now_s, raw, shrinks)
         elif not math.isfinite(low):
             if not self._prefers_high:
-                self._switch(now_s, raw, shrinks)
+                self._prefer_other_side(now_s, raw, shrinks)
         else:
             down, up = (distance_to_edge(own_value, edge, self._cyclic) for edge in (low, high))
             nearer_high = up <= down or is_same_value(up, down)
@@ -313,9 +319,9 @@ class ResolutionMemory:
             elif now_s - self._since_s < self._persistence_s or abs(up - down) < self._near:
                 return
             elif other <= mine and nearer_high != self._prefers_high:
-                self._switch(now_s, raw, shrinks)
+                self._prefer_other_side(now_s, raw, shrinks)
 
-    def _switch(self, now_s: float, raw: list[float], shrinks: int) -> None:
+    def _prefer_other_side(self, now_s: float, raw: list[float], shrinks: int) -> None:
         self._prefers_high, self._since_s = not self._prefers_high, now_s
         for side in (_LOW, _HIGH):
             if self._shrinks[side] >= shrinks:
@@ -349,6 +355,6 @@ class GuidanceMemory:
         """Update the memory with one instant's guidance; return bands and resolution to show."""
         own_value, recovery = guided.own_value, guided.recovery
         bands = self._bands.step(now_s, guided.line, own_value, recovery)
-        way = resolution(bands, own_value, self._corrective, self._cyclic)
+        way = nearest_values_outside_red(bands, own_value, self._corrective, self._cyclic)
         shown = self._resolutions.step(now_s, way, bands, own_value, recovery)
         return Remembered(bands, shown)

@@ -11,7 +11,7 @@ from components.guidance.potential import (
     Others,
     conflict_mask,
     may_resume,
-    push_velocity,
+    velocity_after_push,
 )
 from components.messages.alerts import AlertLevels
 from components.messages.reach import FarthestLook
@@ -22,7 +22,7 @@ from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 
 # Within this of its goal an aircraft stays; it flies to it no faster than in a second.
 _AT_GOAL_M, _LAST_S = 0.5, 1.0
@@ -109,13 +109,15 @@ class VoltagePotential(Component):
         alerts, states = wake["alerts"], wake["states"]
         if alerts is None or states is None:
             return None
-        self._make_room(alerts)
-        others, own_mps, heard = _others_by_target(alerts, self._contacts)
+        self._update_contacts_and_columns(alerts)
+        others, own_mps, heard = _others_own_velocities_and_mask(alerts, self._contacts)
         if alerts.in_plane:
             # Else a velocity that is held would be another one at every instant.
             own_mps *= find_plane_scale(states.own_lat_deg, states.own_alt_m)
         some, still = heard.any(axis=1), np.isnan(own_mps[0])
-        self._unmoved = add_cases(self._unmoved, wake.run[some & still], wake.run[some])
+        self._unmoved = counts_with_cases_added(
+            self._unmoved, wake.run[some & still], wake.run[some]
+        )
         place = np.array([states.own_lat_deg, states.own_lon_deg, states.own_alt_m])
         commanded = np.full((2, len(wake)), math.nan)
         for turn in indices_by_occurrence(wake.run):
@@ -149,7 +151,9 @@ class VoltagePotential(Component):
             velocity = np.where(active.any(axis=1), own, velocity)
             pushed = now.any(axis=1)
             if pushed.any():
-                velocity = np.where(pushed, push_velocity(seen, own, now, self._kept), velocity)
+                velocity = np.where(
+                    pushed, velocity_after_push(seen, own, now, self._kept), velocity
+                )
             velocity = self._limit_speed(velocity)
             # Nothing is told to who has not been steered, and flies its own way without it.
             silent = np.isnan(known.last_mps[0]) & ~active.any(axis=1) & (self.p.goal_m is None)
@@ -160,11 +164,11 @@ class VoltagePotential(Component):
             newer = known.with_columns(
                 active=active.T.copy(), unheard_s=unheard_s, last_mps=velocity
             )
-            self._known = self._known.replace_runs(run, newer, wake.first_run)
-        return self._velocity_commands(wake, commanded)
+            self._known = self._known.replace_and_drop_earlier_runs(run, newer, wake.first_run)
+        return self._message_of_finite_velocities(wake, commanded)
 
-    def _make_room(self, alerts: AlertLevels) -> None:
-        """Let contacts be those of alerts, and tracks that are active; targets are always all."""
+    def _update_contacts_and_columns(self, alerts: AlertLevels) -> None:
+        """Set the contacts to those alerts may name and active tracks, and columns to match."""
         contacts = np.arange(len(alerts.roster))
         if alerts.numbers:
             active = self._known.active.any(axis=1) if len(self._known) else []
@@ -204,7 +208,7 @@ class VoltagePotential(Component):
         speed_mps = np.hypot(*velocity)
         return np.asarray(velocity * np.minimum(1.0, self.p.most_mps / np.maximum(speed_mps, 1e-9)))
 
-    def _velocity_commands(self, wake: Wake, commanded: FloatArray) -> Velocities | None:
+    def _message_of_finite_velocities(self, wake: Wake, commanded: FloatArray) -> Velocities | None:
         rows = np.flatnonzero(np.isfinite(commanded[0]))
         if not len(rows):
             return None
@@ -216,7 +220,7 @@ class VoltagePotential(Component):
         )  # fmt: skip
 
 
-def _others_by_target(
+def _others_own_velocities_and_mask(
     alerts: AlertLevels, contacts: IntArray
 ) -> tuple[Others, FloatArray, BoolArray]:
     """Return by row the relative positions and velocities of all others, NaN where unknown, the own

@@ -35,15 +35,15 @@ def closest_times_and_positions(others: Others) -> tuple[FloatArray, FloatArray]
     """Return when (s) others are closest, and their relative positions (m) then, (2, n, others)."""
     (east, north), (east_mps, north_mps) = others
     closing = -(east * east_mps + north * north_mps)
-    time_s = closing / np.maximum(_squared(others.velocity_mps), _LEAST_SPEED2)
+    time_s = closing / np.maximum(_squared_lengths(others.velocity_mps), _LEAST_SPEED2)
     return time_s, others.position_m + others.velocity_mps * time_s
 
 
 def conflict_mask(others: Others, kept: KeptApart) -> BoolArray:
     """Return a mask (n, others), True if within the radius before lookahead ends, not if NaN."""
-    speed2 = _squared(others.velocity_mps)
+    speed2 = _squared_lengths(others.velocity_mps)
     time_s, miss = closest_times_and_positions(others)
-    inside2 = kept.radius_m**2 - _squared(miss)
+    inside2 = kept.radius_m**2 - _squared_lengths(miss)
     half_s = np.sqrt(np.maximum(inside2, 0.0) / np.maximum(speed2, _LEAST_SPEED2))
     meets = (inside2 > 0.0) & (time_s - half_s < kept.lookahead_s) & (time_s + half_s > 0.0)
     return np.asarray(meets & (speed2 >= _LEAST_SPEED2))
@@ -67,7 +67,7 @@ def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArra
     return apart
 
 
-def push_velocity(
+def velocity_after_push(
     others: Others, own_mps: FloatArray, pushing: BoolArray, kept: KeptApart
 ) -> FloatArray:
     """Return the velocity (2, n) to which the pushing others change one's own.
@@ -98,6 +98,6 @@ def push_velocity(
     return own_mps - np.stack([np.bincount(row, of, len(pushing)) for of in push])
 
 
-def _squared(vector: FloatArray) -> FloatArray:
+def _squared_lengths(vector: FloatArray) -> FloatArray:
     """Return squares of lengths of vectors (2, ...)."""
     return np.asarray(vector[0] * vector[0] + vector[1] * vector[1])

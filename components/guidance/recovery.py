@@ -9,9 +9,14 @@ import numpy as np
 from components.alert_configuration.configuration import Configuration
 from components.guidance.intervals import Interval
 from components.guidance.manoeuvre_kinds import Conflicts, manoeuvres_of_kind
-from components.guidance.regions import GuidedIntruders, Regions, has_interval, intervals_of
+from components.guidance.regions import (
+    GuidedIntruders,
+    Regions,
+    clear_intervals_of_row,
+    has_neighbouring_clear_values,
+)
 from components.guidance.situation import Detector, State
-from components.well_clear.tcas import recovery_sizes_m
+from components.well_clear.tcas import recovery_cylinder_sizes_m
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 # The search for the earliest recovery ends when it is known this well, s.
@@ -47,7 +52,7 @@ def recovery_cylinder(configuration: Configuration, altitude_m: FloatArray) -> S
     given = (configuration[key] for key in keys)
     result = [
         np.full(np.shape(altitude_m), size) if size > 0.0 else table
-        for size, table in zip(given, recovery_sizes_m(altitude_m), strict=True)
+        for size, table in zip(given, recovery_cylinder_sizes_m(altitude_m), strict=True)
     ]
     return result[0], result[1]
 
@@ -79,7 +84,7 @@ class _Search:
         self._intruders = intruders
         self._sizes = recovery_cylinder(configuration, own.up_m)
         regions = Regions(configuration, self._kind, own, intruders)
-        _, self._concerned = regions.concerned_intruders(configuration["corrective_region"])
+        _, self._concerned = regions.has_region_and_concerned(configuration["corrective_region"])
         self._volumes = [regions.conflicts(one.intruder, one.level) for one in self._concerned]
         # Cylinder about each intruder that counts, of the sizes that are tried.
         self._cylinders: list[Conflicts] = []
@@ -106,7 +111,7 @@ class _Search:
             return rows[~ends]
 
         self._set_cylinders(np.repeat(nmac, count).reshape(2, count))
-        on = self._has_clear_interval(self._clear_of_cylinder())
+        on = self._has_clear_interval(self._is_clear_of_cylinder())
         for row in np.flatnonzero(~on).tolist():
             result[row] = Recovery(-math.inf, nmac, 0), []
         todo = np.flatnonzero(on)
@@ -124,7 +129,7 @@ class _Search:
                 recovery = Recovery(
                     float(time_s[index]), _sizes_of_row(sizes, row), int(shrinks[row])
                 )
-                result[row] = recovery, intervals_of(part._kind, index, clear)
+                result[row] = recovery, clear_intervals_of_row(part._kind, index, clear)
             todo = smaller(rows[~found])
         return [one for one in result if one is not None]
 
@@ -139,7 +144,7 @@ class _Search:
                 rows = rows[on]
                 search, on = self._select_rows(rows), on[on]
             search._set_cylinders(sizes[:, rows])
-            leads = on & search._has_clear_interval(search._clear_of_cylinder())
+            leads = on & search._has_clear_interval(search._is_clear_of_cylinder())
             led.append(rows[leads])
             on = np.isin(rows, smaller(rows[on & ~leads]))
         return np.sort(np.concatenate([*led, np.empty(0, dtype=np.int64)]))
@@ -160,29 +165,29 @@ class _Search:
         ]
 
     def _has_clear_interval(self, clear: BoolArray) -> BoolArray:
-        return has_interval(self._kind, clear)
+        return has_neighbouring_clear_values(self._kind, clear)
 
-    def _clear_of_cylinder(self) -> BoolArray:
+    def _is_clear_of_cylinder(self) -> BoolArray:
         """Return a mask (r, k), True for values clear of the cylinder, whatever the volumes."""
         clear = self._kind.there.copy()
         for one, cylinder in zip(self._concerned, self._cylinders, strict=True):
-            unsafe = cylinder.is_unsafe(0.0, one.horizon_s)
+            unsafe = cylinder.is_in_or_behind_conflict(0.0, one.horizon_s)
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 
     def _is_clear_until(self, time_s: FloatArray) -> BoolArray:
-        """Return a mask (r, k), True if clear of the cylinder to a time (r, 1), then of volumes.
+        """Return a mask (r, k), True if clear of cylinders before a time (r, 1), then of volumes.
 
         Beyond the horizon of an intruder only the cylinder counts, as far as that horizon.
         """
         clear = self._kind.there.copy()
         of_all = zip(self._concerned, self._volumes, self._cylinders, strict=True)
         for one, volume, cylinder in of_all:
-            unsafe = volume.is_unsafe(time_s, one.horizon_s)
+            unsafe = volume.is_in_or_behind_conflict(time_s, one.horizon_s)
             unsafe |= cylinder.has_conflict_before(time_s, one.horizon_s)
             beyond = time_s > one.horizon_s
             if beyond.any():
-                unsafe |= cylinder.is_unsafe(0.0, one.horizon_s) & beyond
+                unsafe |= cylinder.is_in_or_behind_conflict(0.0, one.horizon_s) & beyond
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return clear
 

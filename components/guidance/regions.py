@@ -85,7 +85,7 @@ class Regions:
             self._conflicts[key] = self._kind.find_conflicts(intruder.state.columns(), detector)
         return self._conflicts[key]
 
-    def concerned_intruders(self, region: str) -> tuple[BoolArray, list[Concerned]]:
+    def has_region_and_concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
         """Return a mask (n,) of ownships with an intruder for which a level has the region, and the
         intruders whose volumes count.
         """
@@ -93,26 +93,28 @@ class Regions:
             self._concerned[region] = self._find_concerned(region)
         return self._concerned[region]
 
-    def safe_values(self, region: str) -> tuple[BoolArray, BoolArray]:
+    def has_region_and_safe_values(self, region: str) -> tuple[BoolArray, BoolArray]:
         """Return a mask (n,) of ownships with an intruder for which a level has the region, and a
         mask (n, k) of the values that are safe.
         """
-        known, concerned = self.concerned_intruders(region)
+        known, concerned = self.has_region_and_concerned(region)
         clear = self._kind.there.copy()
         for one in concerned:
-            unsafe = self.conflicts(one.intruder, one.level).is_unsafe(0.0, one.horizon_s)
+            unsafe = self.conflicts(one.intruder, one.level).is_in_or_behind_conflict(
+                0.0, one.horizon_s
+            )
             clear &= ~(unsafe & one.of_whom[:, np.newaxis])
         return known, clear
 
     def has_clear_interval(self, clear: BoolArray) -> BoolArray:
         """Return a mask (n,), True for ownships with two neighbouring clear values in limits."""
-        return has_interval(self._kind, clear)
+        return has_neighbouring_clear_values(self._kind, clear)
 
     def is_in_corrective(self) -> BoolArray:
         """Return a mask (n,), True for ownships now inside an intruder's corrective volume."""
         inside = np.zeros(len(self._own.up_m), dtype=bool)
         for index, intruder in enumerate(self._intruders):
-            level = self._configuration.corrective_level(intruder.alerter)
+            level = self._configuration.first_corrective_level(intruder.alerter)
             if level is not None:
                 inside |= (self._conflict_start_s(index, level) == 0.0) & intruder.is_present()
         return inside
@@ -147,14 +149,16 @@ class Regions:
             ahead = (begin_s == 0.0) | is_surely_less(begin_s, due_s)
             soon_s = min(level.alerting_time_s, self._lookahead_s)
             horizon_s = np.where(ahead, self._lookahead_s, soon_s)[:, np.newaxis]
-            met = self.conflicts(index, level).has_conflict_soon(0.0, horizon_s).any(axis=1)
+            met = (
+                self.conflicts(index, level).has_conflict_within_horizon(0.0, horizon_s).any(axis=1)
+            )
             of_whom = there & (ahead | met)
             if of_whom.any():
                 result.append(Concerned(index, level, of_whom, horizon_s))
         return known, result
 
 
-def has_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
+def has_neighbouring_clear_values(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
     """Return a mask (n,), True for rows with neighbouring clear values not both beyond a limit."""
     both = clear[:, :-1] & clear[:, 1:]
     if not kind.cyclic:
@@ -164,7 +168,7 @@ def has_interval(kind: ManoeuvreKind, clear: BoolArray) -> BoolArray:
     return np.asarray(both.any(axis=1))
 
 
-def intervals_of(kind: ManoeuvreKind, row: int, clear: BoolArray) -> list[Interval]:
+def clear_intervals_of_row(kind: ManoeuvreKind, row: int, clear: BoolArray) -> list[Interval]:
     """Return the intervals of values of one ownship that are clear."""
     there = kind.there[row]
     values = kind.values[row][there]

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from components.well_clear.detection import Bounds, detection_span
+from components.well_clear.detection import Bounds, violation_or_advisory_span
 from components.well_clear.relative_motion import Span, is_surely_less
 from components.well_clear.tcas import TcasAdvisory
 from components.well_clear.volume import Relative, Volume, cylinder_span
@@ -48,7 +48,9 @@ class Detector:
         relative = own.relative_to(intruder)
         if self.volume is not None:
             vertical = own.up_m, own.climb_mps
-            return detection_span(self.volume, relative, vertical, self.bounds, begin_s, end_s)
+            return violation_or_advisory_span(
+                self.volume, relative, vertical, self.bounds, begin_s, end_s
+            )
         assert self.cylinder_m is not None
         return cylinder_span(*self.cylinder_m, relative, begin_s, end_s)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from scipy.special import gammainccinv
 
-from components.high_precision.multiprecision import multiprecision
+from components.high_precision.multiprecision import mpmath_library
 
 DIGITS = 40
 
@@ -43,7 +43,7 @@ def detection_probability_error(
     ImportError
         If mpmath is not installed.
     """
-    mp = multiprecision()
+    mp = mpmath_library()
     with mp.workdps(DIGITS):
         miss = _miss_probability(mp, snr, pulses, false_alarm_probability, swerling)
         return float(abs(mp.mpf(float(pd)) - 1 + miss))

@@ -5,7 +5,7 @@ The yardstick for the reference rungs of ladders. It is slow and needs mpmath.
 
 from typing import Any
 
-from components.high_precision.multiprecision import multiprecision
+from components.high_precision.multiprecision import mpmath_library
 
 DIGITS = 40
 
@@ -37,7 +37,7 @@ def line_of_sight_errors(
     ImportError
         If mpmath is not installed.
     """
-    mp = multiprecision()
+    mp = mpmath_library()
     with mp.workdps(DIGITS):
         here, there = _to_earth_centred(mp, *own), _to_earth_centred(mp, *other)
         apart = [t - h for t, h in zip(there, here, strict=True)]

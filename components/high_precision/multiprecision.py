@@ -4,7 +4,7 @@ import importlib
 from typing import Any
 
 
-def multiprecision() -> Any:
+def mpmath_library() -> Any:
     """Return the library mpmath, which the references are computed with.
 
     Raises

@@ -18,7 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, check_not_negative, positive, unflatten
+from components.arguments.checks import (
+    broadcast_flat,
+    check_not_negative,
+    check_positive,
+    unflatten,
+)
 from components.optical.detection import detection_probability
 
 __all__ = [
@@ -44,9 +49,9 @@ def _filled_beam_share(
     name: str, size: ArrayLike, range_m: ArrayLike, divergence_rad: float, power: int
 ) -> Any:
     shape, (filled, distance) = broadcast_flat(
-        **{name: check_not_negative(name, size), "range_m": positive("range_m", range_m)}
+        **{name: check_not_negative(name, size), "range_m": check_positive("range_m", range_m)}
     )
-    width_m = float(positive("divergence_rad", divergence_rad)) * distance
+    width_m = float(check_positive("divergence_rad", divergence_rad)) * distance
     return unflatten(np.minimum(filled / (0.25 * math.pi * width_m**power), 1.0), shape)
 
 
@@ -68,16 +73,16 @@ def received_laser_power_w(
     """
     shape, (part, distance, bright) = broadcast_flat(
         share=check_not_negative("share", share),
-        range_m=positive("range_m", range_m),
+        range_m=check_positive("range_m", range_m),
         reflectivity=check_not_negative("reflectivity", reflectivity),
     )
-    sent_w = float(positive("peak_power_w", peak_power_w)) * float(
+    sent_w = float(check_positive("peak_power_w", peak_power_w)) * float(
         check_not_negative("efficiency", efficiency)
     )
     depth = 2.0 * float(check_not_negative("extinction_per_m", extinction_per_m)) * distance
     with np.errstate(under="ignore"):
         left = np.exp(-depth)
-        collected = (0.5 * float(positive("aperture_m", aperture_m)) / distance) ** 2
+        collected = (0.5 * float(check_positive("aperture_m", aperture_m)) / distance) ** 2
         return unflatten(sent_w * part * bright * collected * left, shape)
 
 
@@ -94,7 +99,7 @@ def mean_shots_on_target(
     shape, (target, beam, each) = broadcast_flat(
         area_rad2=check_not_negative("area_rad2", area_rad2),
         beam_area_rad2=check_not_negative("beam_area_rad2", beam_area_rad2),
-        spacing_rad2=positive("spacing_rad2", spacing_rad2),
+        spacing_rad2=check_positive("spacing_rad2", spacing_rad2),
     )
     return unflatten(np.maximum(target, beam) / each, shape)
 

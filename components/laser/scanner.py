@@ -149,7 +149,7 @@ class LaserExtinction(Effect[float]):
         return Verdict(True, f"[weather] takes {per_m * 1e4 / math.log(10.0):.3g} dB/km")
 
 
-def _pd(sensor: Any, cells: Cells) -> dict[str, FloatArray]:
+def _detection_probability_column(sensor: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return cells' detection probability as a column; for a range boundary 1 or 0."""
     if isinstance(sensor, ScanningLaser):
         return {_PD.name: sensor.detection_probability(cells)}
@@ -175,7 +175,7 @@ SHOTS = Ladder(
     ),
     "scanned",
     (_PD,),
-    make_cell_measure(_pd, out_of_range=0.0),
+    make_cell_measure(_detection_probability_column, out_of_range=0.0),
 )
 
 
@@ -219,10 +219,10 @@ class ScanningLaser(SweepingSensor):
     def snr_and_shots(self, cells: Cells) -> tuple[FloatArray, FloatArray]:
         """Return each cell's ratio of echo amplitude to noise in a shot, and a scan's mean hits."""
         column = cells.roster.column
-        thick_m = 1e-3 * cells.of_target(column("laser.wire_diameter_mm"))
+        thick_m = 1e-3 * cells.column_at_targets(column("laser.wire_diameter_mm"))
         wire = np.isfinite(thick_m)
         thick_m = np.where(wire, thick_m, 0.0)
-        area_m2 = cells.of_target(column("laser.area_m2"))
+        area_m2 = cells.column_at_targets(column("laser.area_m2"))
         if np.isnan(area_m2[~wire]).any():
             area_m2 = np.where(np.isnan(area_m2), area_of_cells(cells, "eo", "exact"), area_m2)
         area_m2 = np.where(wire, 0.0, area_m2)
@@ -237,7 +237,7 @@ class ScanningLaser(SweepingSensor):
         power_w = received_laser_power_w(
             share, range_m, peak_power_w=self.p.peak_power_w,
             aperture_m=1e-3 * self.p.aperture_mm, efficiency=self.p.efficiency,
-            reflectivity=cells.of_target(column("laser.reflectivity")),
+            reflectivity=cells.column_at_targets(column("laser.reflectivity")),
             extinction_per_m=self._extinction_per_m,
         )  # fmt: skip
         for left in self.built(TRANSMISSION):
@@ -245,7 +245,7 @@ class ScanningLaser(SweepingSensor):
         snr = np.minimum(power_w / self.p.noise_equivalent_power_w, _STRONGEST)
         if self.p.pattern == "one_shot":
             return snr, np.ones(len(cells))
-        length_m = np.where(wire, cells.of_target(column("laser.wire_length_m")), 0.0)
+        length_m = np.where(wire, cells.column_at_targets(column("laser.wire_length_m")), 0.0)
         length_rad = slant * length_m / range_m
         # Rows of shots are as far apart everywhere, columns nearer to each other up and down.
         _, elevation = self.axes(cells.body_azimuth_rad, cells.body_elevation_rad)
@@ -287,11 +287,11 @@ class ScanningLaser(SweepingSensor):
         above_db = snr_db - 20.0 * math.log10(self.threshold)
         return Look(detected, above_db, extras, {"amplitude": strength})
 
-    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+    def _extra_columns(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return the columns recorded with a detection, without the probability of detection, which
         only the simulation knows.
         """
-        extras = dict(super()._extras(cells, look))
+        extras = dict(super()._extra_columns(cells, look))
         extras.pop("detection_probability", None)
         return extras
 
@@ -314,7 +314,7 @@ class ScanningLaser(SweepingSensor):
 def _sine_to_wire(cells: Cells) -> FloatArray:
     """Return the sine of the angle between each cell's line of sight and its wire."""
     direction, slope = (
-        np.radians(cells.of_target(cells.roster.column(f"laser.wire_{name}_deg")))
+        np.radians(cells.column_at_targets(cells.roster.column(f"laser.wire_{name}_deg")))
         for name in ("direction", "slope")
     )
     along = np.stack(unit_vector(direction, slope))

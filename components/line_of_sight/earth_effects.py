@@ -8,11 +8,11 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.environment.tables import Terrain
-from components.geometry import POSITION_FIELDS, SeenFromOwnship, sensor_angles
+from components.geometry import POSITION_FIELDS, SeenFromOwnship, body_angles_of_sight_line
 from components.terrain.rays import (
     is_behind_limb,
     is_behind_terrain,
-    max_undetected_ground_m,
+    max_ground_above_clear_ray_m,
     refracted_elevation_rad,
 )
 from dsa_des.arrays.types import BoolArray
@@ -56,7 +56,9 @@ class Limb(Effect[Hides]):
         return Verdict(horizon, f"[terrain] horizon is {str(horizon).lower()}")
 
     def build(self, block: Any) -> Hides:
-        """Return a function that masks targets behind the limb (True: hidden; absent: False)."""
+        """Return a function giving the mask of targets behind the Earth's horizon; absent:
+        False.
+        """
         terrain = terrain_section(block)
         surface_m = terrain.height_m or 0.0
         return _hide_only_present(
@@ -81,7 +83,8 @@ class Mountains(Effect[Hides]):
             True,
             f"[terrain] raster is {raster.name} ({raster.bounds_text()}); nothing hides beside "
             f"it, and "
-            f"of what stands in a line of sight up to {max_undetected_ground_m(raster):.2g} m may "
+            f"of what stands in a line of sight up to {max_ground_above_clear_ray_m(raster):.2g} "
+            f"m may "
             f"be missed",
         )
 
@@ -115,7 +118,7 @@ class Refraction(Effect[Bends]):
 
         def bends(own: Any, seen: SeenFromOwnship, attitude: str) -> SeenFromOwnship:
             elevation = refracted_elevation_rad(seen.elevation_rad, seen.range_m, refraction)
-            body = sensor_angles(
+            body = body_angles_of_sight_line(
                 seen.azimuth_rad,
                 elevation,
                 own.yaw_rad,

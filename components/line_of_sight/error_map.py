@@ -57,7 +57,7 @@ class ErrorMap:
         ]
 
 
-def error_maps(
+def error_maps_of_earth_models(
     lat_deg: FloatArray | None = None, range_m: FloatArray | None = None
 ) -> list[ErrorMap]:
     """Compute the errors of every model of the Earth over latitude and range."""
@@ -101,7 +101,7 @@ def error_maps(
 
 def draw_error_map(folder: Path) -> list[Path]:
     """Draw the error in angle and in range of every model over range and latitude."""
-    maps = error_maps()
+    maps = error_maps_of_earth_models()
     exact = maps[-1]
     off_rad, off_m = exact.direction_rad.max(), exact.range_error_m.max()
     rounding = (

@@ -8,22 +8,22 @@ from typing import Any
 from components.aircraft.known_targets import KnownTraffic
 from components.geometry import EARTH_MODELS
 from components.geometry.error_bounds import Envelope, ErrorBound, error_bound
-from components.messages.reach import REACH_MARGIN, FarthestLook, farthest_look
+from components.messages.reach import REACH_MARGIN, FarthestLook, combined_farthest_look
 from dsa_des.block.component import Context
 
 
-def convert_model_ranges(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
-    """Return the request with its range, which is by a model of the Earth, moved to `seeming`; the
-    reference model's stays, and without known traffic it is infinite.
+def convert_range_to_seeming(context: Context, earth: str, look: FarthestLook) -> FarthestLook:
+    """Return the request with its range, stated by a model of the Earth, as a pair in `seeming`;
+    unchanged for the reference model, of infinite range without known traffic.
     """
     if earth == REFERENCE[0] or look.range_m == 0.0 or not math.isfinite(look.range_m):
         return look
-    if _known_traffic(context) is None:
+    if _known_traffic_of_only_producer(context) is None:
         return replace(look, range_m=math.inf)
     return replace(look, range_m=0.0, seeming=((earth, look.range_m),))
 
 
-def _known_traffic(context: Context) -> KnownTraffic | None:
+def _known_traffic_of_only_producer(context: Context) -> KnownTraffic | None:
     """Return the only producer's `KnownTraffic`; None if several produce or it offers none."""
     offers = [producer.offer for producer in context.producers]
     return offers[0] if len(offers) == 1 and isinstance(offers[0], KnownTraffic) else None
@@ -126,7 +126,7 @@ def model_label(earth: str, attitude: str = "exact") -> str:
 
 
 def angle_text(angle_rad: float) -> str:
-    """Return, for example, "0.0041 deg"; an error of half a turn is any error."""
+    """Return an angle as text, such as `0.0041 deg`; `any size` if it is half a turn or more."""
     return "any size" if angle_rad >= math.pi else f"{math.degrees(angle_rad):.2g} deg"
 
 
@@ -181,7 +181,7 @@ def pick_models(transform: Any) -> PickedModels:
         return stay("the reference: everything is simulated")
     if not given:
         return stay("the reference: [accuracy] allows no error of angle or range")
-    look = farthest_look(consumer.request for consumer in transform.context.consumers)
+    look = combined_farthest_look(consumer.request for consumer in transform.context.consumers)
     if look.exact_because:
         return stay(f"the reference: {look.exact_because}")
     envelopes = _line_of_sight_envelopes(transform, look)
@@ -219,7 +219,7 @@ def pick_models(transform: Any) -> PickedModels:
 
 def _line_of_sight_envelopes(transform: Any, look: FarthestLook) -> list[Envelope] | None:
     """Return each sensor's bounds in range, altitude and angle; None if traffic states none."""
-    known = _known_traffic(transform.context)
+    known = _known_traffic_of_only_producer(transform.context)
     if known is None:
         return None
     envelopes = []

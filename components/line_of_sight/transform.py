@@ -23,10 +23,10 @@ from components.line_of_sight.earth_effects import (
 from components.line_of_sight.model_choice import (
     REFERENCE,
     PickedModels,
-    convert_model_ranges,
+    convert_range_to_seeming,
     pick_models,
 )
-from components.messages.reach import FarthestLook, farthest_look
+from components.messages.reach import FarthestLook, combined_farthest_look
 from components.messages.targets import RelativeTargets, TrafficStates
 from components.navigation.errors import OWNSHIP, NavigationErrors
 from components.sensor.ladder_values import (
@@ -70,7 +70,7 @@ def measured_lines_of_sight(
     }
 
 
-def _straight_rays_note(block: Any) -> str:
+def _why_refraction_is_skipped(block: Any) -> str:
     """Return why refraction needs no simulation with straight rays; empty where they bend."""
     bends = terrain_section(block).refraction != "none"
     return "" if bends else "[terrain] refraction is 'none': rays are straight"
@@ -82,7 +82,7 @@ def line_of_sight_truth_errors(
     """Return a transform's errors against the line of sight at 40 digits (needs mpmath)."""
     from components.high_precision.line_of_sight import line_of_sight_errors
 
-    if not _straight_rays_note(block):
+    if not _why_refraction_is_skipped(block):
         raise Unavailable("nothing more exact is known of bent rays")
     states, seen = wake["states"], block.run(wake)
     errors = []
@@ -147,7 +147,7 @@ REFRACTION = Ladder(
     "four_thirds",
     QUANTITIES,
     measured_lines_of_sight,
-    applies=_straight_rays_note,
+    applies=_why_refraction_is_skipped,
 )  # fmt: skip
 
 
@@ -206,10 +206,10 @@ class Transform(Component):
         self._line_of_sight = LineOfSight(self.rung.earth, self.rung.attitude)
 
     def request(self, port: str) -> FarthestLook:
-        """Return the downstream sensors' farthest-reaching request, to pass to the traffic."""
-        look = farthest_look(consumer.request for consumer in self.context.consumers)
+        """Return one request that covers all sensors downstream, to pass to the traffic."""
+        look = combined_farthest_look(consumer.request for consumer in self.context.consumers)
         earth = REFERENCE[0] if self.rung is None else self.rung.earth
-        return convert_model_ranges(self.context, earth, look)
+        return convert_range_to_seeming(self.context, earth, look)
 
     def skipped_work_notes(self) -> list[str]:
         """Return a sentence for each geometry model that was picked, with the reason."""
@@ -242,16 +242,19 @@ class Transform(Component):
             columns=states.columns,
             culled=states.culled,
             believed={
-                name: store_once_if_equal(v) for name, v in self._believed_columns(states).items()
+                name: store_once_if_equal(v)
+                for name, v in self._believed_pose_columns(states).items()
             },
             own_attitude={name: getattr(states, f"own_{name}") for name in POSE_FIELDS[3:]},
             revisit=None
             if states.flights is None
-            else states.flights.view_through(self._columns_at_other_instants),
-            **self._target_columns(own, states, states.present),
+            else states.flights.with_states_transformed(self._columns_at_other_instants),
+            **self._relative_target_columns(own, states, states.present),
         )
 
-    def _target_columns(self, own: Any, other: Any, present: BoolArray) -> dict[str, AnyArray]:
+    def _relative_target_columns(
+        self, own: Any, other: Any, present: BoolArray
+    ) -> dict[str, AnyArray]:
         """Return the fields of `RelativeTargets` that are per row and target."""
         rows, width = present.shape
         step = max(1, CELLS_AT_ONCE // max(1, width))
@@ -282,7 +285,7 @@ class Transform(Component):
         for bends in self._bending:
             seen = bends(own, seen, self._line_of_sight.attitude)
         heading = wrap_pi_unchecked(other.yaw_rad - seen.azimuth_rad)
-        _require_numbers(seen.body_azimuth_rad, heading, other.pitch_rad, other.roll_rad)
+        _refuse_non_finite_angles(seen.body_azimuth_rad, heading, other.pitch_rad, other.roll_rad)
         fields = {
             **seen._asdict(),
             "relative_heading_rad": heading,
@@ -295,14 +298,14 @@ class Transform(Component):
 
     def _columns_at_other_instants(self, own: Any, other: Any) -> dict[str, Any]:
         """Return line-of-sight columns at other instants, with targets' and ownship's positions."""
-        seen = self._target_columns(own, other, own.present & other.present)
+        seen = self._relative_target_columns(own, other, own.present & other.present)
         return {
             **seen,
             "target": {name: getattr(other, name) for name in POSITION_FIELDS},
             "own": {name: getattr(own, name) for name in (*POSE_FIELDS, "present")},
         }
 
-    def _believed_columns(self, states: TrafficStates) -> dict[str, FloatArray]:
+    def _believed_pose_columns(self, states: TrafficStates) -> dict[str, FloatArray]:
         """Return the ownship's believed pose by column; the true one without navigation errors."""
         for belief in self._beliefs:
             return belief(states)
@@ -326,8 +329,8 @@ def _broadcast_ownship(states: TrafficStates) -> SimpleNamespace:
     return SimpleNamespace(**dict(zip(POSE_FIELDS, wide, strict=True)))
 
 
-def _require_numbers(*angles: FloatArray) -> None:
-    """Refuse what is not a finite number, here for all blocks downstream."""
+def _refuse_non_finite_angles(*angles: FloatArray) -> None:
+    """Raise ValueError if any of the values is not a finite number."""
     # A sum is finite only if all of it is; it stands for whatever the angles came from.
     if not math.isfinite(sum(first_row_if_stored_once(values).sum() for values in angles)):
         raise ValueError("a position or an attitude of the traffic is not a finite number")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from components.aircraft.aircraft import Roster
-from components.messages.columns import target_names
+from components.messages.columns import target_name_of_each_entry
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import Producer
 from dsa_des.block.message import Column, Message, Text, column, columns, per_entry, per_row, static
@@ -57,7 +57,7 @@ class AlertLevels(Message):
     offsets: IntArray
     target: IntArray = column(
         "", "", "name of the target; of a track, the nearest one, null if far from all", "text",
-        value=target_names,
+        value=target_name_of_each_entry,
     )  # fmt: skip
     level: IntArray = column("", "", "alert level, 0 without an alert", "int64")
     times: dict[str, FloatArray] = columns(_TIMES)
@@ -105,8 +105,8 @@ class AlertsOffered(NamedTuple):
     period_s: float  # Between its scans
 
 
-def note_unreached_level(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
-    """Return a list with a note if a key asks for a level that no producer sends, else empty."""
+def unreached_level_notes(key: str, level: int, producers: Iterable[Producer]) -> list[str]:
+    """Return a list of one sentence if a key asks for a level no producer sends, else empty."""
     offered = [p.offer.levels for p in producers if isinstance(p.offer, AlertsOffered)]
     if not offered or level <= max(offered):
         return []

@@ -130,6 +130,6 @@ TOLD = (
 )  # fmt: skip
 
 
-def target_names(message: Any) -> Text:
+def target_name_of_each_entry(message: Any) -> Text:
     """Return the names of a message's targets, entry by entry."""
     return Text(message.target, message.roster.names)

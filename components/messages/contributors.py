@@ -12,7 +12,7 @@ _BITS_OF_INT64 = 63
 _COUNTED_BITS = 12
 
 
-def mask_type(sensors: int) -> type:
+def mask_dtype_for_sensors(sensors: int) -> type:
     """Return the NumPy type of masks with a bit for each sensor.
 
     Beyond 63 sensors masks are Python's integers, which hold any number of bits.
@@ -20,8 +20,8 @@ def mask_type(sensors: int) -> type:
     return np.int64 if sensors <= _BITS_OF_INT64 else object
 
 
-def combination_text(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
-    """Return for each bit mask the names of its sensors joined by ``+``."""
+def joined_sensor_names_of_masks(contributors: IntArray, sensors: tuple[str, ...]) -> Text:
+    """Return for each bit mask the names of its sensors, joined by ``+``."""
     if len(sensors) <= _COUNTED_BITS:  # counting was measured to be the fastest
         used = np.bincount(contributors, minlength=1)
         masks = np.flatnonzero(used)
@@ -37,6 +37,6 @@ def sensor_names_in_mask(mask: int, sensors: tuple[str, ...]) -> tuple[str, ...]
     return tuple(name for i, name in enumerate(sensors) if mask >> i & 1)
 
 
-def contributor_names(message: Any) -> Text:
+def contributor_names_by_entry(message: Any) -> Text:
     """Return for each entry of a message the names of its contributing sensors joined by ``+``."""
-    return combination_text(message.contributors, message.sensors)
+    return joined_sensor_names_of_masks(message.contributors, message.sensors)

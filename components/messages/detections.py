@@ -20,7 +20,7 @@ from components.messages.columns import (
     MeasuredLine,
     StatedErrors,
     TrueLine,
-    target_names,
+    target_name_of_each_entry,
 )
 from components.messages.looks import look_columns
 from components.messages.reach import Reach
@@ -212,11 +212,11 @@ class SensorOffer:
 _OFTEN_S = 2.0
 
 
-def report_interval_promises(
+def range_and_report_interval_pairs(
     period_s: float, promises: Iterable[tuple[float, float]] = ()
 ) -> tuple[tuple[float, float], ...]:
-    """Return pairs of range (m) and time (s): up to that range a target is reported again within
-    that time, 19 times in 20.
+    """Return pairs (range in m, time in s): a target up to that range is reported again within that
+    time in 19 of 20 cases.
 
     `promises` are those that it makes whatever its looks. Of a sensor that looks often nothing is
     said of its looks, so that replicas may differ in their rates.
@@ -235,7 +235,7 @@ def offers_of_fused_sensors(producers: Iterable[Any]) -> dict[str, Any]:
     return offers
 
 
-def names_of_rangeless_sensors(producers: Iterable[Any]) -> str:
+def joined_names_if_all_rangeless(producers: Iterable[Any]) -> str:
     """Return the sensors' names joined by `and` if none of them measures range; an empty string if
     one does or none is known.
     """
@@ -308,10 +308,14 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         of=PER_ROW, name="detected", value=lambda message: np.diff(message.offsets),
     )  # fmt: skip
     skipped: dict[str, IntArray] = columns(
-        _SKIPPED, of=PER_ROW, value=lambda m: m.skipped_columns()
+        _SKIPPED, of=PER_ROW, value=lambda m: m.skipped_count_columns()
     )
     target: IntArray = column(
-        "", "", "name of the target; null for a false alarm", "text", value=target_names
+        "",
+        "",
+        "name of the target; null for a false alarm",
+        "text",
+        value=target_name_of_each_entry,
     )
     confidence: FloatArray = column(
         "dB or signature", "", "margin of the detection, by the kind of sensor"
@@ -375,8 +379,8 @@ class Detections(MeasuredLine, TrueLine, StatedErrors, Message):
         setattr(result, name, stuck)
         return result
 
-    def skipped_columns(self) -> dict[str, IntArray]:
-        """Return each scan's skipped targets, in one column ``skipped_…`` for each reason."""
+    def skipped_count_columns(self) -> dict[str, IntArray]:
+        """Return how many targets each scan skipped, in a column ``skipped_…`` for each reason."""
         return {f"skipped_{reason}": count for reason, count in self.skipped.items()}
 
     def extra_columns(self) -> dict[str, AnyArray]:

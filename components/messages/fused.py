@@ -13,9 +13,9 @@ from components.messages.columns import (
     MeasuredLine,
     StatedErrors,
     TrueLine,
-    target_names,
+    target_name_of_each_entry,
 )
-from components.messages.contributors import contributor_names
+from components.messages.contributors import contributor_names_by_entry
 from components.messages.looks import Looks
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.message import Message, Text, column, columns, per_entry, per_row, static
@@ -56,10 +56,10 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
     entry_table = "fused"
 
     offsets: IntArray
-    target: IntArray = column("", "", "name of the target", "text", value=target_names)
+    target: IntArray = column("", "", "name of the target", "text", value=target_name_of_each_entry)
     contributors: IntArray = column(
         "", "", "sensors that were fused, joined by +", "text",
-        name="sensors", value=contributor_names,
+        name="sensors", value=contributor_names_by_entry,
     )  # fmt: skip
     angle_source: IntArray = column(
         "", "", "sensor that the angles are of", "text",

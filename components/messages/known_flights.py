@@ -50,8 +50,10 @@ class AllFlights(Protocol):
     ) -> TrajectoryState:
         """Return the states of the viewing platform in runs (n,), each at its own time (n,)."""
 
-    def compute_once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
-        """Return what `name` keeps if arrays `of` are as last time, else `make` and keep it."""
+    def compute_if_arrays_changed(
+        self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]
+    ) -> Any:
+        """Return the value kept as `name` if the arrays `of` are unchanged, else that of `make`."""
 
 
 class KnownFlights:
@@ -80,7 +82,7 @@ class KnownFlights:
         """Return what is seen of targets at times (rows, 1) or (rows, columns).
 
         The states of who looks, of the times' shape, and of the targets (rows, columns); or what
-        `view_through` makes of them, arrays by name.
+        `with_states_transformed` makes of them, arrays by name.
         """
         run, known = self.run[:, np.newaxis], self.known[:, np.newaxis]
         return self._states(run, known, columns, time_s, 0.0)
@@ -107,9 +109,11 @@ class KnownFlights:
         """Index of the target that the flights are seen from; -1 for the ownship."""
         return self._viewer
 
-    def compute_once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
-        """Return a value computed once for all viewing platforms (`AllFlights.compute_once`)."""
-        return self.flights.compute_once(name, of, make)
+    def compute_if_arrays_changed(
+        self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]
+    ) -> Any:
+        """Return `make`'s value, kept for all viewing platforms while arrays `of` are unchanged."""
+        return self.flights.compute_if_arrays_changed(name, of, make)
 
     def _states(
         self, run: IntArray, known: IntArray, columns: IntArray, time_s: FloatArray, ahead_s: Any
@@ -124,7 +128,7 @@ class KnownFlights:
         """Return the same flights seen from another target, by its index; -1 is the ownship."""
         return self._replace(self.run, self.known, viewer=viewer)
 
-    def view_through(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
+    def with_states_transformed(self, seen: Callable[..., Mapping[str, AnyArray]]) -> KnownFlights:
         """Return the same flights with `seen` applied to their states: it gets those of viewer and
         targets and returns columns.
         """

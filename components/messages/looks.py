@@ -7,7 +7,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from components.messages.columns import TrueLine
-from dsa_des.arrays.entries import select_entries
+from dsa_des.arrays.entries import selected_offsets_and_indices
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.message import (
     Column,
@@ -15,7 +15,7 @@ from dsa_des.block.message import (
     Message,
     Text,
     columns_of_dataclass,
-    instant_columns,
+    tick_and_replica_columns,
 )
 
 
@@ -37,7 +37,7 @@ class Looks:
 
     def take_rows(self, rows: slice | IntArray) -> Self:
         """Return the looks of some rows."""
-        offsets, which = select_entries(self.offsets, rows)
+        offsets, which = selected_offsets_and_indices(self.offsets, rows)
         return type(self)(offsets, self.sensor[which], self.age_ticks[which], self.pose[:, which])
 
     @classmethod
@@ -83,7 +83,7 @@ class EveryLook(Message):
     }
 
 
-def spread_looks(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
+def look_arrays_scans_by_targets(cells: Any, look: Any, scans: int) -> dict[str, AnyArray]:
     """Return cells and look as arrays (scans, targets) by name; NaN or False if not evaluated."""
     shape = (scans, len(cells.roster))
     cell = (cells.row, cells.target)
@@ -110,7 +110,7 @@ def look_columns(detections: Any) -> Columns:
     count = len(detections.roster)
     row = np.repeat(np.arange(len(detections)), count)
     columns: Columns = {
-        **instant_columns(detections, row),
+        **tick_and_replica_columns(detections, row),
         "scan": detections.scan.take(row),
         "target": Text(np.tile(np.arange(count), len(detections)), detections.roster.names),
     }

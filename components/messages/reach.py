@@ -66,7 +66,7 @@ class Reach:
         return min(sector_width_rad(*self.azimuth_rad), TWO_PI), high - low
 
     @property
-    def steepest_rad(self) -> float:
+    def steepest_elevation_rad(self) -> float:
         """Largest absolute elevation in body axes inside the field of view, rad."""
         return max(abs(angle) for angle in self.elevation_rad)
 
@@ -130,8 +130,8 @@ class FarthestLook:
     seeming: tuple[tuple[str, float], ...] = ()
 
 
-def farthest_look(requests: Iterable[object]) -> FarthestLook:
-    """Return a request that covers all consumers'; one without a range makes it unlimited."""
+def combined_farthest_look(requests: Iterable[object]) -> FarthestLook:
+    """Return one request that covers all given; its range is infinite if one states none."""
     looks = [FarthestLook(0.0, ())]
     for request in requests:
         if isinstance(request, FarthestLook):
@@ -142,7 +142,7 @@ def farthest_look(requests: Iterable[object]) -> FarthestLook:
             looks.append(
                 FarthestLook(
                     request.range_max_m,
-                    ((request.range_max_m, request.steepest_rad),),
+                    ((request.range_max_m, request.steepest_elevation_rad),),
                     request.range_slack,
                     request.exact_because,
                     request.lasts_s,
@@ -171,24 +171,24 @@ class Decision:
         own = self.rows
         if rows is own or (len(rows) == len(own) and bool((rows == own).all())):
             return self.reason
-        scan = self._scan_of_row[rows]
+        scan = self._reason_index_of_rows[rows]
         return self.reason[scan] if scan.min(initial=0) >= 0 else None
 
     @property
-    def _scan_of_row(self) -> IntArray:
-        """Row of `reason` that belongs to each message row; -1 where the sensor does not scan."""
+    def _reason_index_of_rows(self) -> IntArray:
+        """Return the row of `reason` for each message row; -1 where the sensor does not scan."""
         scan = np.full(self.count, -1, dtype=np.int64)
         scan[self.rows] = np.arange(len(self.rows))
         return scan
 
     def take_rows(self, rows: slice | IntArray) -> "Decision":
         """Return the decision for some message rows only."""
-        scan = self._scan_of_row[rows]
+        scan = self._reason_index_of_rows[rows]
         kept = np.flatnonzero(scan >= 0)
         return Decision(kept, self.reason[scan[kept]], len(scan))
 
     def widen(self, columns: IntArray, width: int) -> "Decision":
-        """Return the decision over `width` targets: these at `columns`, all others absent."""
+        """Return the decision over `width` targets: its own at `columns`, all others absent."""
         reason = np.full((len(self.reason), width), ABSENT, dtype=np.uint8)
         reason[:, columns] = self.reason
         return Decision(self.rows, reason, self.count)

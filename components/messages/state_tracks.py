@@ -7,7 +7,10 @@ from typing import Any, Self
 import numpy as np
 
 from components.messages.columns import FRAME, FrameOrigin, PositionAndVelocity
-from components.messages.contributors import combination_text, contributor_names
+from components.messages.contributors import (
+    contributor_names_by_entry,
+    joined_sensor_names_of_masks,
+)
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Column, Message, Text, column, columns, static
 
@@ -112,11 +115,15 @@ class StateTracks(PositionAndVelocity, FrameOrigin, Message):
     state_s: FloatArray = column("s", "", "the instant that the state speaks of")
     updated_s: FloatArray = column("s", "", "when the last measurement in it was made")
     contributors: IntArray = column(
-        "", "", "sensors that ever updated it, joined by +", "text", value=contributor_names
+        "",
+        "",
+        "sensors that ever updated it, joined by +",
+        "text",
+        value=contributor_names_by_entry,
     )
     updated_by: IntArray = column(
         "", "", "sensors of its last update, joined by +", "text",
-        value=lambda m: combination_text(m.updated_by, m.sensors),
+        value=lambda m: joined_sensor_names_of_masks(m.updated_by, m.sensors),
     )  # fmt: skip
     own_north_m: FloatArray = column("m", FRAME, "where the ownship believed to be then, north")
     own_east_m: FloatArray = column("m", FRAME, "where the ownship believed to be then, east")

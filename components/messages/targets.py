@@ -91,7 +91,7 @@ def _truth_of_rows(flights: Any, tick: IntArray, time_s: FloatArray, count: int)
     # All three instants are asked for at once.
     times_s = np.concatenate([time_s, time_s + STEP_S, time_s - STEP_S])
     asked = flights.take_rows(np.tile(np.arange(rows), 3))(columns, times_s[:, np.newaxis])
-    states = _with_ownship(asked)
+    states = _states_with_ownship_first(asked)
     state, after, before = (
         {name: values[first : first + rows] for name, values in states.items()}
         for first in (0, rows, 2 * rows)
@@ -127,7 +127,9 @@ def _ned_velocities(
             (way_after, there_after, STEP_S),
             (way_before, there_before, -STEP_S),
         ):
-            far = _with_ownship(part(columns, (time_s[rows] + 2.0 * step_s)[:, np.newaxis]))
+            far = _states_with_ownship_first(
+                part(columns, (time_s[rows] + 2.0 * step_s)[:, np.newaxis])
+            )
             slope = (4.0 * near[:, rows] - _ned_offsets(here, far)) / (2.0 * step_s)
             fits = one_sided[rows] & there[rows] & far["present"]
             velocity[:, rows] = np.where(fits, slope, velocity[:, rows])
@@ -142,7 +144,7 @@ def _ned_offsets(here: _State, there: _State) -> FloatArray:
     return np.stack(line_of_sight_ned(*ends, validate=False))
 
 
-def _with_ownship(states: Any) -> dict[str, Any]:
+def _states_with_ownship_first(states: Any) -> dict[str, Any]:
     """Return the ownship's states (rows, 1) and the targets' (rows, n) side by side."""
     own, others = states
     return {
@@ -240,7 +242,7 @@ class TrafficStates(Message):
     def check(self) -> None:
         """Raise ValueError if an array over targets has not one column for each target."""
         super().check()
-        check_target_columns(self)
+        check_target_count(self)
 
     def tables(self) -> dict[str, Columns]:
         """Return the table ``truth`` if the truth is recorded; else an empty mapping."""
@@ -249,7 +251,7 @@ class TrafficStates(Message):
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return one message with the rows of all parts, over the union of their targets."""
-        return super().concatenate(widen_to_union(parts))
+        return super().concatenate(widen_to_union_of_targets(parts))
 
 
 @dataclass(eq=False)
@@ -318,12 +320,12 @@ class RelativeTargets(Message):
     def check(self) -> None:
         """Raise ValueError if an array over targets has not one column for each target."""
         super().check()
-        check_target_columns(self)
+        check_target_count(self)
 
     @classmethod
     def concatenate(cls, parts: Sequence[Self]) -> Self:
         """Return one message with the rows of all parts, over the union of their targets."""
-        return super().concatenate(widen_to_union(parts))
+        return super().concatenate(widen_to_union_of_targets(parts))
 
 
 @dataclass(eq=False)
@@ -333,7 +335,7 @@ class GatedTargets(RelativeTargets):
     decisions: dict[str, Decision] = per_row()
 
 
-def check_target_columns(message: Any) -> None:
+def check_target_count(message: Any) -> None:
     """Raise ValueError unless the arrays over targets have as many columns as there are targets."""
     count = len(message.columns)
     for name, values in vars(message).items():
@@ -344,7 +346,7 @@ def check_target_columns(message: Any) -> None:
             )
 
 
-def widen_to_union(parts: Sequence[Any]) -> list[Any]:
+def widen_to_union_of_targets(parts: Sequence[Any]) -> list[Any]:
     """Return messages widened to the union of their targets; added ones are not present."""
     first = parts[0].columns
     if all(part.columns is first or np.array_equal(part.columns, first) for part in parts):
@@ -376,7 +378,7 @@ def _widen(part: Any, columns: IntArray) -> Any:
     return result
 
 
-def own_velocity(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
+def own_velocity_ned_m_s(targets: RelativeTargets, row: IntArray, time_s: FloatArray) -> FloatArray:
     """Return the ownship's ground velocity (north, east, down) at rows and times, (3, n), m/s.
 
     From positions 1/64 s before and after, of which one is replaced by the position itself where

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import Self
 
 from components.aircraft.aircraft import Roster
-from components.messages.columns import ERRING_POSE, MeasuredLine, target_names
-from components.messages.contributors import contributor_names
+from components.messages.columns import ERRING_POSE, MeasuredLine, target_name_of_each_entry
+from components.messages.contributors import contributor_names_by_entry
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.message import Message, column, columns, per_entry, static
 
@@ -33,11 +33,11 @@ class Tracks(MeasuredLine, Message):
     entry_table = "tracks"
 
     offsets: IntArray
-    target: IntArray = column("", "", "name of the target", "text", value=target_names)
+    target: IntArray = column("", "", "name of the target", "text", value=target_name_of_each_entry)
     age_s: FloatArray = column("s", "", "time since what is held was measured")
     contributors: IntArray = column(
         "", "", "sensors of that update, joined by +", "text",
-        name="updated_by", value=contributor_names,
+        name="updated_by", value=contributor_names_by_entry,
     )  # fmt: skip
     roster: Roster = static()
     sensors: tuple[str, ...] = static()

@@ -13,17 +13,17 @@ from components.metrics.rows import (
     SensorMetricParameters,
     TargetMetric,
     column_at_rows,
-    earliest_target,
-    first_rows_of_targets,
-    is_at_start,
+    earliest_target_by_replica,
+    first_report_rows_of_targets,
+    is_at_earliest_possible_scan,
     is_named,
     is_of_target,
     left_censoring_text,
+    nth_scan_time_by_replica_s,
     pick_target_by_replica,
-    pick_targets,
-    scan_time_s,
+    pick_target_columns,
     sensors_to_measure,
-    share_columns,
+    share_and_trials_columns,
 )
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.replicas.outage_times import blocks_with_outages, outage_times_of_replicas
@@ -40,7 +40,7 @@ from dsa_des.studies.metric import (
 )
 
 ANY = "any"
-#: Columns of detections that `first_declarations` needs.
+#: Columns of detections that `first_declarations_by_sensor` needs.
 DECLARED = {"detections": ("block", "target", "time_s", "true_range_m", "declared", "scan")}
 _ROWS = ("block", "target", "time_s", "true_range_m")
 
@@ -98,18 +98,18 @@ class FirstDetection(TargetMetric):
             values[f"first_detection_time_s.{name}"] = time_s
             values[f"first_detection_range_m.{name}"] = range_m
             cut = (
-                self._is_fused_at_start(group)
+                self._is_first_fusion_at_start(group)
                 if name == FUSED
-                else is_at_start(group, name, time_s)
+                else is_at_earliest_possible_scan(group, name, time_s)
             )
             values[f"first_detection_cut_off.{name}"] = left_censoring_text(cut, time_s)
         return values
 
-    def _is_fused_at_start(self, group: Group) -> BoolArray:
+    def _is_first_fusion_at_start(self, group: Group) -> BoolArray:
         """Return by replica whether its first fused report rests on a sensor's first scan."""
         columns: Any = group.tables[FUSED]
         rows = np.flatnonzero(is_of_target(columns, self.p.target))
-        first = row_of_first_report(columns, rows, len(group))
+        first = first_report_row_by_replica(columns, rows, len(group))
         sensors = columns["sensors"]
         code = np.where(first >= 0, sensors.codes[first], -1) if len(rows) else first
         result = np.zeros(len(group), dtype=bool)
@@ -117,8 +117,8 @@ class FirstDetection(TargetMetric):
             for name in names.split("+"):
                 # Lateness on the way may vary, but not by a whole scan.
                 seen_s = column_at_rows(columns, "time_s", first) - self.delay_s.get(name, 0.0)
-                begun = ~np.isnan(scan_time_s(group, name, 1))
-                again_s = scan_time_s(group, name, 2)
+                begun = ~np.isnan(nth_scan_time_by_replica_s(group, name, 1))
+                again_s = nth_scan_time_by_replica_s(group, name, 2)
                 result |= (code == number) & begun & ~(seen_s >= again_s)
         return result
 
@@ -132,18 +132,18 @@ def first_report_time_and_range(group: Group, name: str, target: str | None) -> 
     rows = is_of_target(columns, target)
     if name != FUSED:
         rows &= is_named(columns["block"], name)
-    first = row_of_first_report(columns, np.flatnonzero(rows), len(group))
+    first = first_report_row_by_replica(columns, np.flatnonzero(rows), len(group))
     return [
         column_at_rows(columns, "time_s", first),
         column_at_rows(columns, "true_range_m", first),
     ]
 
 
-def row_of_first_report(columns: Any, rows: IntArray, count: int) -> IntArray:
+def first_report_row_by_replica(columns: Any, rows: IntArray, count: int) -> IntArray:
     """Return the row of each replica's first report of any target, -1 where it has none."""
-    each = first_rows_of_targets(columns, rows, count)
+    each = first_report_rows_of_targets(columns, rows, count)
     when_s, range_m = (column_at_rows(columns, name, each) for name in ("time_s", "true_range_m"))
-    which = earliest_target(when_s, range_m)
+    which = earliest_target_by_replica(when_s, range_m)
     return np.where(which < 0, -1, pick_target_by_replica(each, which))
 
 
@@ -171,7 +171,9 @@ class DetectionShare(TargetMetric):
         return [*shares, *(Result(f"out_share.{name}", FRACTION, meaning) for name in out)]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return each replica's share of looks detecting and, if sensors may fail, of time out."""
+        """Return by replica each sensor's share of looks that detect and, where sensors may fail,
+        the share of time for which it was out of service.
+        """
         scans, detections = group.tables["scans"], group.tables["detections"]
         values: dict[str, FloatArray] = {}
         for name in self.names:
@@ -183,7 +185,7 @@ class DetectionShare(TargetMetric):
             )
             rows = detections
             successes = np.bincount(rows["replica"][hits], minlength=len(group))
-            values |= share_columns(f"detection_share.{name}", successes, trials)
+            values |= share_and_trials_columns(f"detection_share.{name}", successes, trials)
         for name, spans in outage_times_of_replicas(
             group.scene, group.replicas, group.duration_s
         ).items():
@@ -204,7 +206,7 @@ class DeclarationParameters(SensorMetricParameters):
     )
 
     @model_validator(mode="after")
-    def _rule(self) -> Self:
+    def _check_m_and_n(self) -> Self:
         if (self.m is None) != (self.n is None):
             raise ValueError("m and n belong together: give both or neither")
         if (self.m or 0) > (self.n or 0):
@@ -228,7 +230,7 @@ class Declaration(TargetMetric):
         self.names = [*self.sensors, ANY]
 
     def results(self) -> list[Result]:
-        """Return four results per sensor."""
+        """Return definitions by sensor: whether, when, at what range, how long after detection."""
         results = []
         for name in self.names:
             cut = f"declaration_cut_off.{name}"
@@ -256,10 +258,14 @@ class Declaration(TargetMetric):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return the first declaration of every replica."""
+        """Return by replica whether, when (s), at what range (m) and how long after the first
+        detection (s) each sensor first declares a target.
+        """
         values: dict[str, AnyArray] = {}
-        for name, each in first_declarations(group, self.p, self.sensors).items():
-            first = each.select_target(earliest_target(each.time_s, each.range_m))
+        for name, each in first_declarations_by_sensor(group, self.p, self.sensors).items():
+            first = each.pick_target_of_replicas(
+                earliest_target_by_replica(each.time_s, each.range_m)
+            )
             values[f"declared.{name}"] = (~np.isnan(first.time_s)).astype(float)
             values[f"declaration_time_s.{name}"] = first.time_s
             values[f"declaration_range_m.{name}"] = first.range_m
@@ -274,7 +280,7 @@ class Declaration(TargetMetric):
         for name in self.sensors:
             parameters = scene.blocks[name].parameters
             clock = scene.blocks[name].cls.clock_of(parameters)
-            m = detections_needed(self.p.m, scene, name)
+            m = detections_needed_to_declare(self.p.m, scene, name)
             if clock is not None:
                 values[f"declaration_delay_s.{name}"] = float(clock.period_s * (m - 1))
         return values
@@ -293,12 +299,12 @@ class Declared(NamedTuple):
     seen_s: FloatArray
     seen_at_start: BoolArray
 
-    def select_target(self, target: IntArray) -> "Declared":
+    def pick_target_of_replicas(self, target: IntArray) -> "Declared":
         """Return one target's first declaration in each replica (target index; -1: NaN)."""
         return Declared(*(pick_target_by_replica(values, target) for values in self))
 
 
-def first_declarations(
+def first_declarations_by_sensor(
     group: Group,
     parameters: DeclarationParameters,
     sensors: list[str],
@@ -316,7 +322,7 @@ def first_declarations(
     index = {name: k for k, name in enumerate(columns["target"].names)}
     wanted = np.array([index.get(name, -1) for name in targets], dtype=np.int64)
     return {
-        name: Declared(*(pick_targets(values, wanted) for values in each))
+        name: Declared(*(pick_target_columns(values, wanted) for values in each))
         for name, each in known.items()
     }
 
@@ -340,23 +346,25 @@ def _first_declarations(
                 parameters.m,
                 parameters.n,
             )
-        first = first_rows_of_targets(columns, rows[declared], count)
+        first = first_report_rows_of_targets(columns, rows[declared], count)
         time_s = column_at_rows(columns, "time_s", first)
-        seen_s = column_at_rows(columns, "time_s", first_rows_of_targets(columns, rows, count))
-        scans = detections_needed(parameters.m, group.scene, name)
+        seen_s = column_at_rows(
+            columns, "time_s", first_report_rows_of_targets(columns, rows, count)
+        )
+        scans = detections_needed_to_declare(parameters.m, group.scene, name)
         result[name] = Declared(
             time_s,
             column_at_rows(columns, "true_range_m", first),
-            is_at_start(group, name, time_s, scans),
+            is_at_earliest_possible_scan(group, name, time_s, scans),
             seen_s,
-            is_at_start(group, name, seen_s),
+            is_at_earliest_possible_scan(group, name, seen_s),
         )
     if result:
         result[ANY] = _earliest_of_sensors(list(result.values()))
     return result
 
 
-def detections_needed(m: int | None, scene: Scene, name: str) -> int:
+def detections_needed_to_declare(m: int | None, scene: Scene, name: str) -> int:
     """Return how many detections declare: `m` if given, else the sensor's ``declare_m``, or 1."""
     return int(m or getattr(scene.blocks[name].parameters, "declare_m", None) or 1)
 

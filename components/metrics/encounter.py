@@ -13,9 +13,14 @@ import numpy as np
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.detection import ANY, DECLARED, DeclarationParameters, first_declarations
-from components.metrics.flown_flights import FlownMetric, evaluate_runs_singly
-from components.metrics.losses import find_closest_approach, loss_times_s
+from components.metrics.detection import (
+    ANY,
+    DECLARED,
+    DeclarationParameters,
+    first_declarations_by_sensor,
+)
+from components.metrics.flown_flights import FlownMetric, make_run_by_run_reader
+from components.metrics.losses import find_closest_approach, loss_nmac_and_start_times_s
 from components.metrics.rows import (
     END,
     SCANS,
@@ -23,13 +28,13 @@ from components.metrics.rows import (
     PlatformParameters,
     TargetParameters,
     censoring_text,
-    earliest_target,
-    is_in_scan,
+    earliest_target_by_replica,
+    is_at_boundary_scan,
     is_named,
     pick_target_by_replica,
     sensors_to_measure,
 )
-from components.metrics.separation import RelativeFlight, traffic_block
+from components.metrics.separation import RelativeFlight, only_traffic_block
 from components.well_clear.volume import PRESETS, Volume
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
 from dsa_des.replicas.outage_times import (
@@ -57,7 +62,7 @@ STEP: Any = Field(
 )  # fmt: skip
 
 
-def size_field(default_m: float, description: str) -> Any:
+def distance_field_m(default_m: float, description: str) -> Any:
     """Return the pydantic field of a distance in m, with a default and a description."""
     return Field(default=default_m, gt=0, le=1e6, description=description)
 
@@ -73,10 +78,10 @@ class EncounterParameters(DeclarationParameters, PlatformParameters):
 class SizeParameters(PlatformParameters):
     """What counts as a loss of well clear, and as a near mid-air collision."""
 
-    horizontal_m: float = size_field(
+    horizontal_m: float = distance_field_m(
         _WELL_CLEAR.horizontal_m, "Horizontal distance below which well clear is lost, m."
     )
-    vertical_m: float = size_field(
+    vertical_m: float = distance_field_m(
         _WELL_CLEAR.vertical_m, "Difference in height below which well clear is lost, m."
     )
     tau_s: float = Field(
@@ -84,15 +89,15 @@ class SizeParameters(PlatformParameters):
         description="Modified tau below which well clear is lost too, s (DO-365: 35). 0: distances "
         "alone.",
     )  # fmt: skip
-    nmac_horizontal_m: float = size_field(
+    nmac_horizontal_m: float = distance_field_m(
         _NMAC.horizontal_m, "Horizontal distance of a near mid-air collision, m."
     )
-    nmac_vertical_m: float = size_field(
+    nmac_vertical_m: float = distance_field_m(
         _NMAC.vertical_m, "Difference in height of a near mid-air collision, m."
     )
 
     @property
-    def sizes_m(self) -> tuple[tuple[float, float], ...]:
+    def well_clear_and_nmac_sizes_m(self) -> tuple[tuple[float, float], ...]:
         """Radius and half height (m) of the well-clear cylinder, then of the NMAC cylinder."""
         return (
             (self.horizontal_m, self.vertical_m),
@@ -103,13 +108,13 @@ class SizeParameters(PlatformParameters):
         """Return (radius, half height) in m by event name plus `kind`: NMAC, and loss of well clear
         unless modified tau defines it.
         """
-        lost, nmac = self.sizes_m
+        lost, nmac = self.well_clear_and_nmac_sizes_m
         clear = {} if self.tau_s else {f"well_clear_lost{kind}": lost}
         return {**clear, f"nmac{kind}": nmac}
 
-    def loss_times_s(self, runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+    def loss_nmac_and_start_times_s(self, runs: Sequence[list[RelativeFlight]]) -> FloatArray:
         """Return times (3, runs), s: first loss of well clear, first NMAC, and 0; NaN if never."""
-        return loss_times_s(self.sizes_m, runs, self.tau_s)
+        return loss_nmac_and_start_times_s(self.well_clear_and_nmac_sizes_m, runs, self.tau_s)
 
 
 class WellClearParameters(EncounterParameters, SizeParameters):
@@ -160,9 +165,9 @@ class ClosestApproach(_Encounter):
         target was detected and declared.
         """
         names, each = self.evaluate_each_flight(
-            group, evaluate_runs_singly(_closest_approach), to_the_end=True
+            group, make_run_by_run_reader(_closest_approach_of_first), to_the_end=True
         )
-        nearest = earliest_target(each[0], each[0])
+        nearest = earliest_target_by_replica(each[0], each[0])
         distance, time_s = (
             pick_target_by_replica(each[0], nearest),
             pick_target_by_replica(each[1], nearest),
@@ -175,8 +180,8 @@ class ClosestApproach(_Encounter):
             "closest_approach_time_s": time_s,
             _CUT_OFF: censoring_text(at, distance),
         }
-        for name, known in first_declarations(group, self.p, self.sensors, names).items():
-            first = known.select_target(nearest)
+        for name, known in first_declarations_by_sensor(group, self.p, self.sensors, names).items():
+            first = known.pick_target_of_replicas(nearest)
             parts = ((first.seen_s, first.seen_at_start), (first.time_s, first.at_start))
             for what, (when_s, cut) in zip(_BEFORE, parts, strict=True):
                 value = time_s - when_s
@@ -207,8 +212,12 @@ class WellClear(_Encounter):
         """Return definitions: both events, time well clear is lost, and warning per sensor."""
         tau = f", or modified tau of {self.p.tau_s:g} s" if self.p.tau_s else ""
         results = [
-            Result("well_clear_lost", EVENT, _cylinder_text(self.p.sizes_m[0], _WELL_CLEAR) + tau),
-            Result("nmac", EVENT, _cylinder_text(self.p.sizes_m[1], _NMAC)),
+            Result(
+                "well_clear_lost",
+                EVENT,
+                _cylinder_text(self.p.well_clear_and_nmac_sizes_m[0], _WELL_CLEAR) + tau,
+            ),
+            Result("nmac", EVENT, _cylinder_text(self.p.well_clear_and_nmac_sizes_m[1], _NMAC)),
             Result(
                 "well_clear_loss_time_s",
                 NUMBER,
@@ -228,16 +237,18 @@ class WellClear(_Encounter):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return by replica event flags, first loss of well clear, warning times by sensor (s)."""
-        names, each = self.evaluate_each_flight(group, self.p.loss_times_s, to_the_end=True)
+        names, each = self.evaluate_each_flight(
+            group, self.p.loss_nmac_and_start_times_s, to_the_end=True
+        )
         lost_s, collision_s, begun_s = each
-        lost_at_start = is_in_scan(lost_s, begun_s)
+        lost_at_start = is_at_boundary_scan(lost_s, begun_s)
         values: dict[str, AnyArray] = {
             "well_clear_lost": (~np.isnan(lost_s)).any(axis=1).astype(float),
             "nmac": (~np.isnan(collision_s)).any(axis=1).astype(float),
             "well_clear_loss_time_s": _least_over_targets(lost_s),
             _LOSS_CUT_OFF: censoring_text(np.where(lost_at_start.any(axis=1), START, "")),
         }
-        for name, first in first_declarations(group, self.p, self.sensors, names).items():
+        for name, first in first_declarations_by_sensor(group, self.p, self.sensors, names).items():
             warning_s = lost_s - first.time_s
             worst = _least_over_targets(warning_s, ~np.isnan(lost_s))
             at_start = (first.at_start | lost_at_start) & (warning_s == worst[:, np.newaxis])
@@ -254,7 +265,7 @@ def _upstream_blocks_that_may_fail(scene: Scene, block: str) -> list[str]:
     What steers the traffic is not: no alert is made of it.
     """
     graph = scene.graph.copy()
-    graph.remove_edges_from(list(graph.in_edges(traffic_block(scene).name)))
+    graph.remove_edges_from(list(graph.in_edges(only_traffic_block(scene).name)))
     return sorted({block, *nx.ancestors(graph, block)}.intersection(blocks_with_outages(scene)))
 
 
@@ -278,7 +289,7 @@ def _cylinder_text(sizes_m: tuple[float, float], standard: Volume) -> str:
     return f"within {horizontal_m:g} m and {vertical_m:g} m"
 
 
-def _closest_approach(flights: list[RelativeFlight]) -> tuple[float, ...]:
+def _closest_approach_of_first(flights: list[RelativeFlight]) -> tuple[float, ...]:
     """Return the first flight's least range (m), its time (s), index of censoring in `_ENDS`."""
     range_m, time_s, end = find_closest_approach(flights[0]) if flights else _NOWHERE
     if not np.isfinite(range_m):
@@ -325,7 +336,7 @@ class AlertTimes(FlownMetric):
 
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene, steered=parameters.steered)
-        traffic = traffic_block(scene).name
+        traffic = only_traffic_block(scene).name
         #: Whether losses are of what was flown, so that a run that ended early has no later ones.
         self._as_flown = parameters.steered or all(w.target != traffic for w in scene.wires)
         self._blocks = self.select_on_platform(blocks_recording(scene, "alerts"))
@@ -335,7 +346,7 @@ class AlertTimes(FlownMetric):
         }
 
     def results(self) -> list[Result]:
-        """Return times and events of each alerting block."""
+        """Return the definitions of alert times and of alert events for each alerting block."""
         results = []
         for name in self._blocks:
             results += [
@@ -364,7 +375,7 @@ class AlertTimes(FlownMetric):
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return replicas' alert times (s), ranges (m); missed, late, nuisance, surprise flags."""
         names, (lost_s, nmac_s, _) = self.evaluate_each_flight(
-            group, self.p.loss_times_s, to_the_end=self._as_flown
+            group, self.p.loss_nmac_and_start_times_s, to_the_end=self._as_flown
         )
         columns = group.tables["alerts"]
         lost, met = ~np.isnan(lost_s), ~np.isnan(nmac_s)
@@ -372,17 +383,19 @@ class AlertTimes(FlownMetric):
         for name in self._blocks:
             mine = is_named(columns["block"], name)
             first_s, below_s = (
-                _first_times_s(columns, mine & (columns["level"] >= level), len(group), names)
+                _first_times_by_target_s(
+                    columns, mine & (columns["level"] >= level), len(group), names
+                )
                 for level in (self.p.level, self.p.level - 1)
             )
             alerted = ~np.isnan(first_s)
             before = alerted & lost & (np.nan_to_num(first_s) <= np.nan_to_num(lost_s))
             lead_s = np.where(before, lost_s - first_s, np.nan)
             missed = lost & ~before
-            range_m = self.ranges_m(group, first_s, to_the_end=self._as_flown)
+            range_m = self.slant_ranges_at_times_m(group, first_s, to_the_end=self._as_flown)
             values[f"first_alert_time_s.{name}"] = _least_over_targets(first_s)
             values[f"first_alert_range_m.{name}"] = pick_target_by_replica(
-                range_m, earliest_target(first_s, range_m)
+                range_m, earliest_target_by_replica(first_s, range_m)
             )
             values[f"alert_to_loss_s.{name}"] = _least_over_targets(lead_s, lost)
             values[f"alert_to_nmac_s.{name}"] = _least_over_targets(nmac_s - first_s, met)
@@ -405,7 +418,7 @@ class AlertTimes(FlownMetric):
         return values
 
 
-def _first_times_s(
+def _first_times_by_target_s(
     columns: Mapping[str, Any], rows: BoolArray, replicas: int, targets: Sequence[str]
 ) -> FloatArray:
     """Return the earliest time of chosen rows, (replicas, targets), s; NaN without one.

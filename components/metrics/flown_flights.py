@@ -9,14 +9,14 @@ import numpy as np
 
 from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_of
 from components.messages.steering import Manoeuvre
-from components.metrics.losses import FlightsTogether, first_within_s
+from components.metrics.losses import FlightsTogether, run_times_first_within_s
 from components.metrics.rows import TargetMetric
 from components.metrics.separation import (
     ANY_TWO,
     RelativeFlight,
+    only_traffic_block,
     relative_flights,
     traffic_and_duration,
-    traffic_block,
 )
 from components.metrics.true_states import Coverage
 from dsa_des.arrays.keyed_table import indices_by_occurrence
@@ -61,8 +61,8 @@ _NOTHING = ManoeuvresTold(
 )
 
 
-def flown_as_steered(own: Sequence[Any], told: Sequence[ManoeuvresTold]) -> list[SteeredFlight]:
-    """Return the flights of aircraft steered by manoeuvres, at least one each."""
+def steered_flights(own: Sequence[Any], told: Sequence[ManoeuvresTold]) -> list[SteeredFlight]:
+    """Return the flights of aircraft as their manoeuvres steer them; each needs one or more."""
     flights = SteeredFleet(fleet_of(own))
     if not told:
         return []
@@ -86,7 +86,7 @@ class FlownMetric(TargetMetric):
 
     def __init__(self, parameters: Any, scene: Scene, *, steered: bool = True) -> None:
         super().__init__(parameters, scene)
-        traffic = traffic_block(scene).name
+        traffic = only_traffic_block(scene).name
         #: Who looks: a target by its index, -1 for the ownship.
         self.viewer = -1
         self._on: dict[str, int] = {}
@@ -120,16 +120,16 @@ class FlownMetric(TargetMetric):
         """Return a replica's viewing platform's flight, as steered, then all it may see."""
         source = traffic_and_duration(group.scenes[number])[0]
         own, *others = source.seen_from(source.platforms()[self.viewer + 1])
-        told = self._received_manoeuvres(group).get(number, _NOTHING)
+        told = self._received_manoeuvres_by_replica(group).get(number, _NOTHING)
         places = [place for place in range(len(source.targets)) if place not in source.unseen]
         places = sorted({*places, self.viewer} - {-1})
         flights = [own, *others]
         of_each = [self.viewer, *(-1 if place == self.viewer else place for place in places)]
         for at, place in enumerate(of_each):
-            there = _limit_to_presence(place, flights[at], told.of(place))
+            there = _manoeuvres_while_present(place, flights[at], told.of(place))
             if len(there.came_s):
                 name = flights[at].name
-                (flights[at],) = flown_as_steered([flights[at]], [there])
+                (flights[at],) = steered_flights([flights[at]], [there])
                 flights[at].name = name
         return flights
 
@@ -137,16 +137,19 @@ class FlownMetric(TargetMetric):
         """Return those of the given blocks that are on the viewing platform."""
         return [block for block in blocks if self._on.get(block, -1) == self.viewer]
 
-    def viewer_manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
+    def viewer_manoeuvres_by_replica(self, group: Group) -> Mapping[int, ManoeuvresTold]:
         """Return the viewing platform's manoeuvres by replica index, for replicas with any."""
-        own = {k: told.of(self.viewer) for k, told in self._received_manoeuvres(group).items()}
+        own = {
+            k: told.of(self.viewer)
+            for k, told in self._received_manoeuvres_by_replica(group).items()
+        }
         return {k: told for k, told in own.items() if len(told.came_s)}
 
-    def steered_runs(self, group: Group) -> IntArray:
+    def steered_replica_indices(self, group: Group) -> IntArray:
         """Return the indices of the replicas in which any aircraft is steered."""
-        return np.array(sorted(self._received_manoeuvres(group)), dtype=np.int64)
+        return np.array(sorted(self._received_manoeuvres_by_replica(group)), dtype=np.int64)
 
-    def _received_manoeuvres(self, group: Group) -> Mapping[int, ManoeuvresTold]:
+    def _received_manoeuvres_by_replica(self, group: Group) -> Mapping[int, ManoeuvresTold]:
         """Return the manoeuvres that arrived, by replica index, for replicas with any.
 
         What is told is known when all before it is.
@@ -190,7 +193,7 @@ class FlownMetric(TargetMetric):
         return {}
 
     def scored_events(self) -> Sequence[str]:
-        """Return the names of events that are cylinders; none if no block steers the ownship."""
+        """Return the names of the events with a cylinder; none if no block steers the ownship."""
         return list(self.cylinders_m()) if self.delays_s else []
 
     def reached_s(
@@ -206,8 +209,10 @@ class FlownMetric(TargetMetric):
         radius_m, half_m = self.cylinders_m()[event]
         if score == "separation":
             limits_m = [(level * radius_m, level * half_m) for level in levels]
-            return self.evaluate_flights(group, partial(first_within_s, limits_m), to_the_end=True)
-        told = self._received_manoeuvres(group)
+            return self.evaluate_flights(
+                group, partial(run_times_first_within_s, limits_m), to_the_end=True
+            )
+        told = self._received_manoeuvres_by_replica(group)
         result = np.full((len(levels), len(group)), np.inf)
         counts = np.zeros(len(group), dtype=np.int64)
         counts[list(told)] = [len(mine.came_s) for mine in told.values()]
@@ -215,9 +220,13 @@ class FlownMetric(TargetMetric):
             # As if no more than so many manoeuvres were told: known from when the last of them is.
             some = np.flatnonzero(counts >= count)
             steering = {k: mine.take(slice(count)) for k, mine in told.items()}
-            runs, run_of = distinct_runs(group, self.p.step_s, None, steering, viewer=self.viewer)
+            runs, run_of = distinct_runs_and_indices(
+                group, self.p.step_s, None, steering, viewer=self.viewer
+            )
             used, mine = np.unique(run_of[some], return_inverse=True)
-            event_s = first_within_s([(radius_m, half_m)], [runs[k] for k in used])[0, mine]
+            event_s = run_times_first_within_s([(radius_m, half_m)], [runs[k] for k in used])[
+                0, mine
+            ]
             known = [(0.0, *told.get(k, _NOTHING).told_s.tolist(), math.inf) for k in some.tolist()]
             from_s, until_s = np.array([times[count : count + 2] for times in known]).T
             for number, level in enumerate(levels):
@@ -244,7 +253,9 @@ class FlownMetric(TargetMetric):
         result[:, run, [index[flight.name] for (flight,) in alone]] = values[:, : len(alone)]
         return names, result[:, run_of]
 
-    def ranges_m(self, group: Group, time_s: FloatArray, *, to_the_end: bool) -> FloatArray:
+    def slant_ranges_at_times_m(
+        self, group: Group, time_s: FloatArray, *, to_the_end: bool
+    ) -> FloatArray:
         """Return slant ranges to targets at a time for each, (replicas, targets), m.
 
         Targets are those of `evaluate_each_flight`; NaN where there is no time, or one is not
@@ -260,16 +271,16 @@ class FlownMetric(TargetMetric):
         flight = np.array([number_of[k, names[t]] for k, t in of], dtype=np.int64)
         if len(flight):
             together = FlightsTogether([flight for _, flight in known])
-            range_m = together.distances_at_m(flight, time_s[replica, target])[0]
+            range_m = together.range_horizontal_vertical_at_m(flight, time_s[replica, target])[0]
             result[replica, target] = np.where(np.isfinite(range_m), range_m, np.nan)
         return result
 
     def _flights(
         self, group: Group, steered: bool, to_the_end: bool, some: IntArray | None = None
     ) -> tuple[list[list[RelativeFlight]], IntArray]:
-        steering = self._received_manoeuvres(group) if steered else {}
+        steering = self._received_manoeuvres_by_replica(group) if steered else {}
         target, step_s = getattr(self.p, "target", None), self.p.step_s
-        return distinct_runs(
+        return distinct_runs_and_indices(
             group, step_s, target, steering, to_the_end=to_the_end, some=some, viewer=self.viewer
         )
 
@@ -278,12 +289,12 @@ class FlownMetric(TargetMetric):
 Read = Callable[[Sequence[list[RelativeFlight]]], FloatArray]
 
 
-def evaluate_runs_singly(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
-    """Return a function that stacks `read` of each run's flights, (values, runs)."""
+def make_run_by_run_reader(read: Callable[[list[RelativeFlight]], tuple[float, ...]]) -> Read:
+    """Return a function that applies `read` run by run and stacks its values, (values, runs)."""
     return lambda runs: np.array([read(flights) for flights in runs]).T
 
 
-def distinct_runs(
+def distinct_runs_and_indices(
     group: Group,
     step_s: float | None,
     target: str | None,
@@ -301,7 +312,7 @@ def distinct_runs(
     `to_the_end` of it, or as long as it was meant to last.
     """
     steering = steering or {}
-    traffic = traffic_block(group.scene)
+    traffic = only_traffic_block(group.scene)
     block = f"blocks.{traffic.name}."
     if any(key.startswith(block) for replica in group.replicas for key in replica.changes):
         cls: Any = traffic.cls
@@ -331,9 +342,11 @@ def distinct_runs(
         (number, place, flight, there)
         for number in steered
         for place, flight in _flights_by_index(runs[run_of[number]]).items()
-        if len((there := _limit_to_presence(place, flight, steering[number].of(place))).came_s)
+        if len(
+            (there := _manoeuvres_while_present(place, flight, steering[number].of(place))).came_s
+        )
     ]
-    flown = flown_as_steered([one[2] for one in told], [one[3] for one in told])
+    flown = steered_flights([one[2] for one in told], [one[3] for one in told])
     by_run: dict[int, dict[int, SteeredFlight]] = {}
     for (number, place, *_), new in zip(told, flown, strict=True):
         by_run.setdefault(number, {})[place] = new
@@ -358,7 +371,7 @@ def _flights_by_index(run: Sequence[RelativeFlight]) -> dict[int, Any]:
     }
 
 
-def _limit_to_presence(place: int, flight: Any, told: ManoeuvresTold) -> ManoeuvresTold:
+def _manoeuvres_while_present(place: int, flight: Any, told: ManoeuvresTold) -> ManoeuvresTold:
     """Return the manoeuvres that arrive while an aircraft is present; all for the ownship."""
     if place < 0:
         return told

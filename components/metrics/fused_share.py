@@ -23,7 +23,7 @@ from components.metrics.rows import (
     is_of_target,
     select_rows,
     sensors_to_measure,
-    share_columns,
+    share_and_trials_columns,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import may_end_its_run
@@ -64,14 +64,14 @@ class FusedShare(TargetMetric):
         }
 
     def results(self) -> list[Result]:
-        """Return one share per ordered pair of sensors."""
+        """Return the definition of one share for each ordered pair of sensors."""
         return [
             Result(_share_name(a, b), SHARE, f"detections of {a} that were fused with one of {b}")
             for a, b in self.pairs
         ]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Count detections and those that were fused, in every replica."""
+        """Return by ordered sensor pair each replica's fused share and number of detections."""
         detections: Any = group.tables["detections"]
         fused: Any = group.tables[FUSED]
         rows = is_of_target(fused, self.p.target) & is_named(fused["block"], self.fusion)
@@ -80,12 +80,14 @@ class FusedShare(TargetMetric):
         for a, b in self.pairs:
             seen = is_named(detections["block"], a) & is_of_target(detections, self.p.target)
             own = select_rows(detections, seen, "target", "time_s")
-            both = _names_sensor(fused["sensors"], a) & _names_sensor(fused["sensors"], b)
+            both = _contains_sensor_name(fused["sensors"], a) & _contains_sensor_name(
+                fused["sensors"], b
+            )
             pair = select_rows(fused, both, "target", "time_s")
-            used = _detections_used(own, pair, self.delay_s[a])
+            used = _fused_detection_indices(own, pair, self.delay_s[a])
             trials = np.bincount(own["replica"], minlength=len(group))
             successes = np.bincount(own["replica"][used], minlength=len(group))
-            values |= share_columns(_share_name(a, b), successes, trials)
+            values |= share_and_trials_columns(_share_name(a, b), successes, trials)
         return values
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
@@ -156,14 +158,16 @@ def _share_name(a: str, b: str) -> str:
     return f"fused_share.{a}_with_{b}"
 
 
-def _names_sensor(column: Any, name: str) -> BoolArray:
+def _contains_sensor_name(column: Any, name: str) -> BoolArray:
     """Return which rows of a column such as ``radar+eo`` contain a sensor's name (mask)."""
     assert isinstance(column, Text)
     holds = np.array([name in known.split("+") for known in column.names] + [False], dtype=bool)
     return holds[column.codes]
 
 
-def _detections_used(own: dict[str, Any], fused: dict[str, Any], delay_s: float) -> IntArray:
+def _fused_detection_indices(
+    own: dict[str, Any], fused: dict[str, Any], delay_s: float
+) -> IntArray:
     """Return the indices of detections that fused rows use: the latest arrived of each target."""
     names = {name: k for k, name in enumerate(own["target"].names)}
     lookup = np.array([names.get(name, -1) for name in fused["target"].names] + [-1])
@@ -189,7 +193,8 @@ def coincidence_share(
     before_s: Fraction = Fraction(0),
     after_s: Fraction = Fraction(0),
 ) -> Fraction:
-    """Return the long-run share of a clock's scans at t with a scan of the other near t.
+    """Return the long-run share of a clock's scans, at t, for which the other scans between t -
+    before_s and t + after_s.
 
     That is one at t - before_s ≤ t' ≤ t + after_s, both bounds inclusive and 0 or more.
     """
@@ -250,7 +255,7 @@ def mean_coincidence_share(
 
 
 def _scan_ticks(spec: ClockSpec, ticks_per_s: int, end_tick: int) -> IntArray:
-    return ScanClock(spec, ticks_per_s).between(0, end_tick)[1]
+    return ScanClock(spec, ticks_per_s).scans_between(0, end_tick)[1]
 
 
 def _probability_in_gate(apart: IntArray, gate: int, sigma: float) -> FloatArray:

@@ -15,19 +15,19 @@ from components.flights.closest_approach import (
     KnownTimes,
     RegularTimes,
     SampleTimes,
-    censoring_end,
     closest_approaches,
+    describe_censoring_end,
 )
 from components.flights.fleet import CELLS_AT_ONCE
 from components.flights.many_flights import fleet_of
 from components.geometry import TrajectoryState, line_of_sight_ned
 from components.metrics.separation import (
     RelativeFlight,
-    distances_m,
-    position_of,
-    states_with_mean_velocity,
+    lat_lon_alt_of,
+    own_enu_with_mean_velocity,
+    range_horizontal_vertical_m,
 )
-from components.well_clear.separation import first_inside_cylinder
+from components.well_clear.separation import first_time_inside_cylinder_s
 from components.well_clear.volume import Volume, is_inside_cylinder, violation_span
 from dsa_des.arrays.types import FloatArray, IntArray
 
@@ -39,24 +39,25 @@ def find_closest_approach(flight: RelativeFlight) -> tuple[float, float, str]:
     """
     best = (float("inf"), float("nan"))
     looked_s = np.full(2, np.nan)
-    for piece in flight.pieces():
+    for piece in flight.separations_by_piece():
         index = int(np.argmin(piece.range_m))
         if piece.range_m[index] < best[0]:
             best = float(piece.range_m[index]), float(piece.time_s[index])
         there_s = piece.time_s[np.isfinite(piece.range_m)]
         if len(there_s):
             looked_s = np.array([np.fmin(looked_s[0], there_s[0]), there_s[-1]])
-    present_s = np.array(flight.present_s())[:, 0]
-    return *best, censoring_end(best[1], looked_s, present_s, flight.end_s)
+    present_s = np.array(flight.presence_start_and_end_s())[:, 0]
+    return *best, describe_censoring_end(best[1], looked_s, present_s, flight.end_s)
 
 
 def first_times_inside(flight: Any, *limits_m: tuple[float, float]) -> list[float]:
     """Return when the target is first within each (horizontal, vertical) distance, s; else NaN.
 
-    Asked at the flight's times only, and exclusive; `first_losses_s` looks between them.
+    Asked at the flight's times only, and exclusive; `flight_times_first_within_s` looks between
+    them.
     """
     result = [float("nan")] * len(limits_m)
-    for piece in flight.pieces():
+    for piece in flight.separations_by_piece():
         for number, (horizontal_m, vertical_m) in enumerate(limits_m):
             inside = is_inside_cylinder(
                 piece.horizontal_m, piece.vertical_m, horizontal_m, vertical_m
@@ -78,7 +79,7 @@ def first_violation_s(flight: RelativeFlight, volume: Volume) -> float:
     modified tau by some (τ + range/v)·a·d/v: at 1 m/s², 0.1 s and 100 m/s by 0.07 s with 35 s.
     """
     carried = np.empty(0)
-    for piece in flight.pieces():
+    for piece in flight.separations_by_piece():
         there = np.isfinite(piece.range_m)
         time_s = np.concatenate([carried, piece.time_s[there]])
         carried = time_s[-1:] if len(there) and there[-1] else np.empty(0)
@@ -86,7 +87,7 @@ def first_violation_s(flight: RelativeFlight, volume: Volume) -> float:
             continue
         begin, end = time_s[:-1], time_s[1:]
         span = violation_span(
-            volume, states_with_mean_velocity(flight, begin, begin, end), 0.0, end - begin
+            volume, own_enu_with_mean_velocity(flight, begin, begin, end), 0.0, end - begin
         )
         met = np.isfinite(span.begin_s)
         if met.any():
@@ -114,9 +115,11 @@ class FlightsTogether:
         """Return the states of the targets of flights (n,), each at its own time (n,)."""
         return self._targets.each(flight, time_s)
 
-    def present_s(self) -> tuple[FloatArray, FloatArray]:
+    def presence_start_and_end_s(self) -> tuple[FloatArray, FloatArray]:
         """Return when both aircraft can be present, first and last time, (flights,) each, s."""
-        limits = np.array([flight.present_s() for flight in self.flights]).reshape(-1, 2)
+        limits = np.array([flight.presence_start_and_end_s() for flight in self.flights]).reshape(
+            -1, 2
+        )
         return limits[:, 0], limits[:, 1]
 
     def closing_speed_bound_mps(self) -> FloatArray:
@@ -129,20 +132,24 @@ class FlightsTogether:
         """Return horizontal distance and altitude difference of flights (n,), each at its own time,
         m; infinite if one is absent.
         """
-        return self.distances_at_m(flight, time_s)[1:]
+        return self.range_horizontal_vertical_at_m(flight, time_s)[1:]
 
-    def distances_at_m(self, flight: IntArray, time_s: FloatArray) -> tuple[FloatArray, ...]:
+    def range_horizontal_vertical_at_m(
+        self, flight: IntArray, time_s: FloatArray
+    ) -> tuple[FloatArray, ...]:
         """Return slant range, horizontal distance and altitude difference of flights (n,), each at
         its own time (n,), m.
         """
         blocks = []
         for first in range(0, len(flight), CELLS_AT_ONCE):
             some = flight[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE]
-            blocks.append(distances_m(self.own_at(*some), self.target_at(*some)))
+            blocks.append(range_horizontal_vertical_m(self.own_at(*some), self.target_at(*some)))
         return tuple(np.concatenate(parts) for parts in zip(*blocks, strict=True))
 
 
-def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, float]) -> FloatArray:
+def flight_times_first_within_s(
+    flights: Sequence[RelativeFlight], *limits_m: tuple[float, float]
+) -> FloatArray:
     """Return the first time (s) at which each target is within each (horizontal, vertical)
     distance, (flights, limits).
 
@@ -157,7 +164,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
         return result
     rows = np.array(between)
     together = FlightsTogether([flights[number] for number in between])
-    first_s, last_s = together.present_s()
+    first_s, last_s = together.presence_start_and_end_s()
     end_s = np.array([flight.end_s for flight in together.flights])
     closing_mps = together.closing_speed_bound_mps()
     for k, limits in enumerate(limits_m):
@@ -168,7 +175,7 @@ def first_losses_s(flights: Sequence[RelativeFlight], *limits_m: tuple[float, fl
                 maybe &= ~np.isnan(result[rows, before])
         some = np.flatnonzero(maybe)
         apart = partial(_states_of_some, together.horizontal_and_vertical_m, some)
-        result[rows[some], k] = first_inside_cylinder(
+        result[rows[some], k] = first_time_inside_cylinder_s(
             apart, (np.maximum(first_s, 0.0)[some], np.minimum(last_s, end_s)[some]),
             closing_mps[some], *limits,
         )  # fmt: skip
@@ -181,7 +188,7 @@ def nearest_ranges_and_times(flights: Sequence[RelativeFlight]) -> tuple[FloatAr
     Infinite and NaN where both are never there.
     """
     result = np.full((2, len(flights)), np.inf)
-    short = [number for number, flight in enumerate(flights) if flight.is_short]
+    short = [number for number, flight in enumerate(flights) if flight.has_few_sample_times]
     for number in sorted(set(range(len(flights))) - set(short)):
         result[:, number] = find_closest_approach(flights[number])[:2]
     if short:
@@ -191,12 +198,12 @@ def nearest_ranges_and_times(flights: Sequence[RelativeFlight]) -> tuple[FloatAr
 
 def _nearest_of_short_flights(flights: Sequence[RelativeFlight]) -> tuple[FloatArray, FloatArray]:
     together = FlightsTogether(flights)
-    first_s, last_s = together.present_s()
+    first_s, last_s = together.presence_start_and_end_s()
     best = Approaches.unknown(len(flights))
     grids: dict[tuple[float, float], list[int]] = {}
     for number, flight in enumerate(flights):
         grids.setdefault((flight.step_s, flight.grid_end_s), []).append(number)
-    own_samples = KnownTimes(*(flight.sample_times_s() for flight in flights))
+    own_samples = KnownTimes(*(flight.source_sample_times_s() for flight in flights))
     ends_s = np.array([flight.grid_end_s for flight in flights])
     every = np.arange(len(flights))
     looks: list[tuple[IntArray, SampleTimes]] = [(every, own_samples)]
@@ -215,7 +222,7 @@ def _nearest_of_short_flights(flights: Sequence[RelativeFlight]) -> tuple[FloatA
     return best.range_m, best.time_s
 
 
-def loss_times_s(
+def loss_nmac_and_start_times_s(
     sizes_m: tuple[tuple[float, float], ...],
     runs: Sequence[list[RelativeFlight]],
     tau_s: float = 0.0,
@@ -227,7 +234,7 @@ def loss_times_s(
     """
     flights = [flight for run in runs for flight in run]
     of_run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
-    first = first_losses_s(flights, *sizes_m)
+    first = flight_times_first_within_s(flights, *sizes_m)
     if tau_s > 0.0:
         volume = Volume(*sizes_m[0], horizontal_time_s=tau_s)
         first[:, 0] = [first_violation_s(flight, volume) for flight in flights]
@@ -238,7 +245,7 @@ def loss_times_s(
     return result
 
 
-def first_within_s(
+def run_times_first_within_s(
     limits_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
 ) -> FloatArray:
     """Return the first time (s) at which any target of a run is within each (horizontal, vertical)
@@ -248,7 +255,7 @@ def first_within_s(
     """
     flights = [flight for run in runs for flight in run]
     of_run = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
-    first = first_losses_s(flights, *limits_m)
+    first = flight_times_first_within_s(flights, *limits_m)
     result = np.full((len(limits_m), len(runs)), np.nan)
     for number in range(len(limits_m)):
         np.fmin.at(result[number], of_run, first[:, number])
@@ -269,15 +276,16 @@ def displacements_around(
     ownship's level plane then, each (2, flights).
     """
     together = FlightsTogether(flights)
-    first_s, last_s = together.present_s()
+    first_s, last_s = together.presence_start_and_end_s()
     last_s = np.minimum(last_s, [flight.end_s for flight in flights])
     every = np.arange(len(flights))
-    here = position_of(together.own_at(every, time_s))
+    here = lat_lon_alt_of(together.own_at(every, time_s))
     ends = [np.clip(time_s + sign * base_s, first_s, last_s) for sign in (-1.0, 1.0)]
     result = []
     for at in (together.own_at, together.target_at):
         (north0, east0, _), (north1, east1, _) = (
-            line_of_sight_ned(*here, *position_of(at(every, end)), validate=False) for end in ends
+            line_of_sight_ned(*here, *lat_lon_alt_of(at(every, end)), validate=False)
+            for end in ends
         )
         result.append(np.array([north1 - north0, east1 - east0]))
     return result[0], result[1]
@@ -289,7 +297,7 @@ _COARSE_S = 1.0
 _BASE_S = 0.5
 
 
-def course_and_bearing_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+def nearest_course_and_bearing_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     """Return relative course and bearing of each run's nearest intruder at its closest approach,
     (2, runs), degrees.
 
@@ -298,7 +306,7 @@ def course_and_bearing_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     never meet.
     """
     flights = [flight for run in runs for flight in run]
-    nearest = _nearest_of_each(runs, *nearest_ranges_and_times(flights))
+    nearest = _nearest_flight_of_each_run(runs, *nearest_ranges_and_times(flights))
     angles = np.full((2, len(runs)), np.nan)
     angles[:, nearest.runs] = _course_and_bearing_deg(
         *displacements_around([flights[k] for k in nearest.flights], nearest.time_s, _BASE_S)
@@ -306,17 +314,18 @@ def course_and_bearing_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     return angles
 
 
-def nominal_geometry(
+def nearest_meeting_geometry(
     sizes_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
 ) -> FloatArray:
-    """Return approximately how each run meets its nearest intruder, (7 + 2 cylinders, runs).
+    """Return roughly the time, distances, speed, lead time, course and bearing of each run's
+    nearest meeting, then two distances per cylinder, (7 + 2 cylinders, runs).
 
     Time (s), horizontal and vertical distance (m) and relative speed in the level plane (m/s) at
     the closest approach, NaN for how long before it was foreseen, then course and bearing
-    (`course_and_bearing_deg`), degrees; NaN where none is met. Then how near any comes to the side
-    while no further up or down than each cylinder reaches, and up or down while no further to the
-    side, m; infinite where it never is. Distances are looked at every `_COARSE_S`: enough to
-    choose by.
+    (`nearest_course_and_bearing_deg`), degrees; NaN where none is met. Then how near any comes to
+    the side while no further up or down than each cylinder reaches, and up or down while no
+    further to the side, m; infinite where it never is. Distances are looked at every `_COARSE_S`:
+    enough to choose by.
     """
     flights = [flight for run in runs for flight in run]
     result = np.full((7 + 2 * len(sizes_m), len(runs)), np.nan)
@@ -334,7 +343,7 @@ def nominal_geometry(
     )
     range_m = np.hypot(level_m, up_m)
     index = np.argmin(range_m, axis=1)
-    nearest = _nearest_of_each(runs, range_m[every, index], times_s[index])
+    nearest = _nearest_flight_of_each_run(runs, range_m[every, index], times_s[index])
     some, time_s = nearest.flights, nearest.time_s
     own_m, other_m = displacements_around([flights[k] for k in some], time_s, _BASE_S)
     speed_mps = np.hypot(*(other_m - own_m)) / (2.0 * _BASE_S)
@@ -351,13 +360,13 @@ def nominal_geometry(
     return result
 
 
-def nearest_in_runs(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
+def run_nearest_range_and_time(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
     """Return each run's smallest range over all its flights (m) and its time (s), (2, runs).
 
     NaN where no two are ever there together.
     """
     range_m, time_s = nearest_ranges_and_times([flight for run in runs for flight in run])
-    nearest = _nearest_of_each(runs, range_m, time_s)
+    nearest = _nearest_flight_of_each_run(runs, range_m, time_s)
     result = np.full((2, len(runs)), np.nan)
     result[:, nearest.runs] = range_m[nearest.flights], nearest.time_s
     return result
@@ -371,7 +380,7 @@ class _Nearest(NamedTuple):
     time_s: FloatArray
 
 
-def _nearest_of_each(
+def _nearest_flight_of_each_run(
     runs: Sequence[list[RelativeFlight]], distance_m: FloatArray, time_s: FloatArray
 ) -> _Nearest:
     met: list[int] = []

@@ -32,6 +32,6 @@ class ManoeuvreTimes(FlownMetric):
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
         """Return each replica's first manoeuvre arrival (s; else NaN) and their number."""
         first, count = np.full(len(group), np.nan), np.zeros(len(group))
-        for replica, told in self.viewer_manoeuvres(group).items():
+        for replica, told in self.viewer_manoeuvres_by_replica(group).items():
             first[replica], count[replica] = told.came_s[0], len(told.came_s)
         return {"first_manoeuvre_time_s": first, "manoeuvres": count}

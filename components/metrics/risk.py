@@ -14,12 +14,16 @@ import numpy.typing as npt
 from pydantic import Field
 
 from components.arguments.units import FOOT_M
-from components.metrics.encounter import STEP, SizeParameters, size_field
-from components.metrics.flown_flights import FlownMetric, evaluate_runs_singly
-from components.metrics.losses import nearest_in_runs
+from components.metrics.encounter import STEP, SizeParameters, distance_field_m
+from components.metrics.flown_flights import FlownMetric, make_run_by_run_reader
+from components.metrics.losses import run_nearest_range_and_time
 from components.metrics.rows import TargetParameters
-from components.metrics.separation import RelativeFlight, relative_states, traffic_block
-from components.well_clear.severity import collision_probability, loss_severity
+from components.metrics.separation import (
+    RelativeFlight,
+    only_traffic_block,
+    own_enu_relative_to_target,
+)
+from components.well_clear.severity import collision_probability, loss_severity_percent
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.results.ratio import METHODS, PairedRatio, paired_ratio
 from dsa_des.scene.scene import Scene
@@ -64,12 +68,12 @@ class Mitigated(FlownMetric):
     def __init__(self, parameters: Any, scene: Scene) -> None:
         super().__init__(parameters, scene)
         if not self.delays_s:
-            name = traffic_block(scene).name
+            name = only_traffic_block(scene).name
             raise ValueError(f"nothing steers the ownship: no manoeuvres are wired to {name!r}")
 
     def results(self) -> list[Result]:
         """Return four results' definitions: loss of well clear, NMAC, nominal and mitigated."""
-        sizes = self.p.sizes_m
+        sizes = self.p.well_clear_and_nmac_sizes_m
         return [
             Result(f"{name}_{which}", EVENT, f"{how} within {radius:g} m and {half:g} m")
             for name, (radius, half) in zip(_EVENTS, sizes, strict=True)
@@ -80,7 +84,7 @@ class Mitigated(FlownMetric):
         """Return each replica's flags of both events, nominal (no manoeuvres) and mitigated."""
         nominal = self.nominal_event_flags(group)
         mitigated = {name: nominal[f"{name}_nominal"].copy() for name in _EVENTS}
-        told = self.steered_runs(group)
+        told = self.steered_replica_indices(group)
         if len(told):
             for name, flags in self.event_flags(group, steered=True, some=told).items():
                 mitigated[name][told] = flags
@@ -104,7 +108,7 @@ class Mitigated(FlownMetric):
         steered or without manoeuvres.
         """
         lost_s, collision_s, _ = self.evaluate_flights(
-            group, self.p.loss_times_s, steered=steered, some=some
+            group, self.p.loss_nmac_and_start_times_s, steered=steered, some=some
         )
         return {
             name: (~np.isnan(time_s)).astype(float)
@@ -147,7 +151,9 @@ class LeastSeparation(FlownMetric):
         ]
         return results + [
             Result(f"any_{name}", EVENT, f"any two within {radius:g} m and {half:g} m")
-            for name, (radius, half) in zip(_EVENTS, self.p.sizes_m, strict=True)
+            for name, (radius, half) in zip(
+                _EVENTS, self.p.well_clear_and_nmac_sizes_m, strict=True
+            )
         ]
 
     def cylinders_m(self) -> Mapping[str, tuple[float, float]]:
@@ -157,8 +163,10 @@ class LeastSeparation(FlownMetric):
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
         """Return each replica's least range of any pair (m), its time (s), both events' flags."""
-        range_m, time_s = self.evaluate_flights(group, nearest_in_runs, to_the_end=True)
-        losses = self.evaluate_flights(group, self.p.loss_times_s, to_the_end=True)[:2]
+        range_m, time_s = self.evaluate_flights(group, run_nearest_range_and_time, to_the_end=True)
+        losses = self.evaluate_flights(group, self.p.loss_nmac_and_start_times_s, to_the_end=True)[
+            :2
+        ]
         return {
             "least_separation_m": range_m,
             "least_separation_time_s": time_s,
@@ -172,8 +180,8 @@ class LeastSeparation(FlownMetric):
 class SeverityParameters(TargetParameters, SizeParameters):
     """Sizes of the boundary, and whose altimeters are which."""
 
-    horizontal_m: float = size_field(4000 * FOOT_M, "Horizontal size of well clear, m.")
-    vertical_m: float = size_field(450 * FOOT_M, "Vertical size of well clear, m.")
+    horizontal_m: float = distance_field_m(4000 * FOOT_M, "Horizontal size of well clear, m.")
+    vertical_m: float = distance_field_m(450 * FOOT_M, "Vertical size of well clear, m.")
     tau_s: float = Field(default=35.0, ge=0, le=600, description="Its modified tau, s.")
     mode_c_own: bool = Field(
         default=False,
@@ -213,14 +221,13 @@ class Severity(FlownMetric):
         target is ever present with the ownship.
         """
         values = self.evaluate_flights(
-            group, evaluate_runs_singly(self._severity_and_collision), to_the_end=True
+            group, make_run_by_run_reader(self._severity_and_collision), to_the_end=True
         )
         return {"slowc_percent": values[0], "pnmac": values[1]}
 
     def _severity_and_collision(self, flights: list[RelativeFlight]) -> tuple[float, ...]:
         each = [
-            (self._largest_severity(flight), self._collision_probability(flight))
-            for flight in flights
+            (self._largest_severity(flight), self._nmac_probability(flight)) for flight in flights
         ]
         values = np.array(each, dtype=np.float64).reshape(-1, 2)
         if not len(values) or np.isnan(values).all():
@@ -233,10 +240,10 @@ class Severity(FlownMetric):
         sizes = self.p.horizontal_m, self.p.vertical_m, self.p.tau_s
 
         def at(time_s: FloatArray) -> FloatArray:
-            return loss_severity(relative_states(flight, time_s), *sizes)
+            return loss_severity_percent(own_enu_relative_to_target(flight, time_s), *sizes)
 
         best, best_s = float("nan"), float("nan")
-        for piece in flight.pieces():
+        for piece in flight.separations_by_piece():
             time_s = piece.time_s[np.isfinite(piece.range_m)]
             if len(time_s):
                 result = at(time_s)
@@ -247,10 +254,10 @@ class Severity(FlownMetric):
             return best
         return max(best, float(at(self._refine_times(flight, best_s)).max()))
 
-    def _collision_probability(self, flight: RelativeFlight) -> float:
+    def _nmac_probability(self, flight: RelativeFlight) -> float:
         """Return the probability of an NMAC at the horizontal closest approach of a flight."""
         best, best_s = float("inf"), float("nan")
-        for piece in flight.pieces():
+        for piece in flight.separations_by_piece():
             index = int(np.argmin(piece.horizontal_m))
             if piece.horizontal_m[index] < best:
                 best, best_s = float(piece.horizontal_m[index]), float(piece.time_s[index])
@@ -273,7 +280,7 @@ class Severity(FlownMetric):
 
     def _refine_times(self, flight: RelativeFlight, time_s: float) -> FloatArray:
         """Return a finer grid around one time, limited to when both aircraft are present, s."""
-        first_s, last_s = (float(times[0]) for times in flight.present_s())
+        first_s, last_s = (float(times[0]) for times in flight.presence_start_and_end_s())
         step_s = self.p.step_s / _FINER
         about = time_s + step_s * np.arange(-_FINER, _FINER + 1)
         return np.clip(about, max(first_s, 0.0), min(last_s, flight.end_s))

@@ -20,8 +20,8 @@ START, END = "the start", "the end of the run"
 NEVER = "never"
 
 
-def is_in_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
-    """Return which events are at the run's first (or last) scan, which may cut them off (mask)."""
+def is_at_boundary_scan(time: FloatArray | int, scan: FloatArray | int) -> BoolArray:
+    """Return a mask of the times that equal a given scan's, at which the run may cut them off."""
     return np.equal(time, scan)
 
 
@@ -38,7 +38,7 @@ def censoring_text(at: AnyArray, values: FloatArray | None = None) -> AnyArray:
 
 
 FUSED = "fused"
-#: Columns of the sensors' scans that `scan_time_s` needs.
+#: Columns of the sensors' scans that `nth_scan_time_by_replica_s` needs.
 SCANS = {"scans": ("block", "time_s")}
 
 
@@ -81,7 +81,7 @@ class TargetMetric(Metric):
             raise ValueError(f"target: there is no {target!r}{did_you_mean(target, names)}")
 
 
-def number_results(meanings: Mapping[str, str]) -> list[Result]:
+def nonnegative_result_definitions(meanings: Mapping[str, str]) -> list[Result]:
     """Return the definitions of results that are numbers >= 0, from names and descriptions."""
     return [Result(name, NUMBER, meaning, least=0.0) for name, meaning in meanings.items()]
 
@@ -125,8 +125,8 @@ def select_rows(columns: Columns, rows: BoolArray, *names: str) -> dict[str, Any
     return result
 
 
-def first_rows_of_targets(columns: Columns, rows: IntArray, count: int) -> IntArray:
-    """Return the row of each target's first report by replica, (replicas, names); else -1.
+def first_report_rows_of_targets(columns: Columns, rows: IntArray, count: int) -> IntArray:
+    """Return each target's first row in each replica, (replicas, targets); -1 without one.
 
     Names are those of the column; rows to look at and columns are in recorded order.
     """
@@ -139,7 +139,7 @@ def first_rows_of_targets(columns: Columns, rows: IntArray, count: int) -> IntAr
     return result.reshape(count, many)
 
 
-def earliest_target(time_s: FloatArray, range_m: FloatArray) -> IntArray:
+def earliest_target_by_replica(time_s: FloatArray, range_m: FloatArray) -> IntArray:
     """Return each replica's earliest target (index), the nearest of several; -1 if all NaN.
 
     Times and ranges (replicas, targets) are NaN for what does not happen; -1 where nothing does.
@@ -160,7 +160,7 @@ def pick_target_by_replica(values: AnyArray, target: IntArray) -> AnyArray:
     return _append_missing(values)[np.arange(len(values)), target]
 
 
-def pick_targets(values: AnyArray, target: IntArray) -> AnyArray:
+def pick_target_columns(values: AnyArray, target: IntArray) -> AnyArray:
     """Return the columns of the given targets for all replicas, (replicas, given targets); NaN or 0
     where a target is -1.
     """
@@ -181,14 +181,16 @@ def column_at_rows(columns: Columns, name: str, rows: IntArray) -> FloatArray:
     return result
 
 
-def share_columns(name: str, successes: AnyArray, trials: AnyArray) -> dict[str, FloatArray]:
+def share_and_trials_columns(
+    name: str, successes: AnyArray, trials: AnyArray
+) -> dict[str, FloatArray]:
     """Return a share (NaN without trials) and its number of trials under two column names."""
     with np.errstate(invalid="ignore", divide="ignore"):
         share = np.where(trials > 0, successes / trials, np.nan)
     return {name: share, name + TRIALS: trials.astype(float)}
 
 
-def name_ranks(column: Any) -> IntArray:
+def alphabetical_name_ranks(column: Any) -> IntArray:
     """Return each row's alphabetical rank of its name, else -1, so codes do not set the order."""
     assert isinstance(column, Text)
     rank = np.empty(len(column.names) + 1, dtype=np.int64)
@@ -199,7 +201,7 @@ def name_ranks(column: Any) -> IntArray:
     return np.asarray(rank[column.codes])
 
 
-def scan_time_s(group: Group, name: str, number: int) -> FloatArray:
+def nth_scan_time_by_replica_s(group: Group, name: str, number: int) -> FloatArray:
     """Return the time of scan `number` (from 1) in each replica, s; NaN if it has fewer scans."""
     time_s, start, end = group.cached(
         ("scans_of", name), lambda: _scan_times_and_bounds(group, name)
@@ -219,12 +221,14 @@ def _scan_times_and_bounds(group: Group, name: str) -> tuple[FloatArray, IntArra
     return columns["time_s"][rows], *ends
 
 
-def is_at_start(group: Group, name: str, time_s: FloatArray, scans: int = 1) -> BoolArray:
-    """Return which times are that of scan `scans`, the earliest that the run's start allows.
+def is_at_earliest_possible_scan(
+    group: Group, name: str, time_s: FloatArray, scans: int = 1
+) -> BoolArray:
+    """Return a mask of the times that equal the time of a sensor's scan `scans` (from 1).
 
     Times are those of replicas, or of replicas and their targets.
     """
-    return is_in_scan(time_s.T, scan_time_s(group, name, scans)).T
+    return is_at_boundary_scan(time_s.T, nth_scan_time_by_replica_s(group, name, scans)).T
 
 
 def left_censoring_text(cut: BoolArray, values: FloatArray) -> AnyArray:

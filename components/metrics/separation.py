@@ -16,11 +16,11 @@ import numpy as np
 from components.flights.closest_approach import (
     STEP_S,
     SampleTimes,
-    present_together_s,
+    common_presence_bounds_s,
     regular_count,
     regular_times_s,
 )
-from components.geometry import line_of_sight, north_east_up
+from components.geometry import line_of_sight, north_east_up_offsets_m
 from components.traffic.source import TrafficSource
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.component import Context
@@ -55,7 +55,7 @@ class Separation:
     vertical_m: FloatArray
 
 
-def traffic_block(scene: Scene) -> Block:
+def only_traffic_block(scene: Scene) -> Block:
     """Return the scene's only traffic block with known flights; ValueError if none or several."""
     result = [b for b in scene.blocks.values() if issubclass(b.cls, TrafficSource)]
     if len(result) != 1:
@@ -67,7 +67,7 @@ def traffic_block(scene: Scene) -> Block:
 
 def traffic_and_duration(scene: Scene) -> tuple[Any, float]:
     """Return a scene's traffic source, built without a run, and the duration of the run, s."""
-    block = traffic_block(scene)
+    block = only_traffic_block(scene)
     context = Context(Streams(scene.seed), scene.ticks_per_s, sections=scene.sections)
     source: Any = block.cls(block.name, block.parameters, context)
     duration = scene.duration_s or source.natural_duration_s() or Fraction(0)
@@ -136,7 +136,7 @@ class RelativeFlight:
         return result
 
     @property
-    def is_short(self) -> bool:
+    def has_few_sample_times(self) -> bool:
         """Return whether its sample times are few enough for one array."""
         return self._count <= _KEPT
 
@@ -145,7 +145,7 @@ class RelativeFlight:
         """The last time of the grid, s."""
         return float(regular_times_s(self.step_s, np.array([self._count - 1]))[0])
 
-    def sample_times_s(self) -> FloatArray:
+    def source_sample_times_s(self) -> FloatArray:
         """Return 0 and the times within the grid at which the source itself has samples, s."""
         result = [np.zeros(1)]
         for times in self._samples():
@@ -155,9 +155,11 @@ class RelativeFlight:
             ]
         return np.unique(np.concatenate(result))
 
-    def present_s(self) -> tuple[FloatArray, FloatArray]:
+    def presence_start_and_end_s(self) -> tuple[FloatArray, FloatArray]:
         """Return the first and last time at which both aircraft can be present, (1,) each, s."""
-        return present_together_s(self.own, np.array([self.target.interval_present()]), self.end_s)
+        return common_presence_bounds_s(
+            self.own, np.array([self.target.interval_present()]), self.end_s
+        )
 
     @property
     def closing_speed_bound_mps(self) -> float:
@@ -167,22 +169,22 @@ class RelativeFlight:
 
     def separation_at(self, time_s: FloatArray) -> Separation:
         """Return the distances at some times."""
-        return Separation(self.name, time_s, *distances_m(*self.states(time_s)))
+        return Separation(self.name, time_s, *range_horizontal_vertical_m(*self.states(time_s)))
 
     def states(self, time_s: FloatArray) -> tuple[Any, Any]:
         """Return the states of ownship and target at some times."""
         return self.own.at(time_s), self.target.at(time_s)
 
-    def pieces(self) -> Iterator[Separation]:
+    def separations_by_piece(self) -> Iterator[Separation]:
         """Yield distances over pieces of about `MOST_AT_ONCE` times; short runs computed once."""
-        if not self.is_short:
-            yield from self._pieces()
+        if not self.has_few_sample_times:
+            yield from self._separations_by_piece()
             return
         if self._known is None:
-            self._known = list(self._pieces())
+            self._known = list(self._separations_by_piece())
         yield from self._known
 
-    def _pieces(self) -> Iterator[Separation]:
+    def _separations_by_piece(self) -> Iterator[Separation]:
         samples = self._samples()
         after_s = 0.0
         for start in range(0, self._count, MOST_AT_ONCE):
@@ -211,12 +213,12 @@ def _sample_times_between(
 ) -> FloatArray:
     """Return the sample times of one target in [first_s, last_s], s."""
     one = np.array([target])
-    first, last = times.numbers_between(one, np.array([first_s]), np.array([last_s]))
+    first, last = times.first_and_last_sample_numbers(one, np.array([first_s]), np.array([last_s]))
     number = np.arange(first[0], last[0] + 1)
     return times.time_of(np.full(len(number), target), number)
 
 
-def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
+def range_horizontal_vertical_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return slant range, horizontal distance and difference of altitudes between two states, m.
 
     Infinite where either is absent.
@@ -233,34 +235,36 @@ def distances_m(own: Any, other: Any) -> tuple[FloatArray, FloatArray, FloatArra
     )
 
 
-def position_of(state: Any) -> list[FloatArray]:
+def lat_lon_alt_of(state: Any) -> list[FloatArray]:
     """Return latitude and longitude (deg) and altitude (m) of a state."""
     parts = state.lat_deg, state.lon_deg, state.alt_m
     return [np.ascontiguousarray(part, dtype=np.float64) for part in parts]
 
 
-def relative_states(flight: RelativeFlight, time_s: FloatArray) -> tuple[FloatArray, ...]:
-    """Return the ownship's position relative to a target: east, north, up (m), rates (m/s).
+def own_enu_relative_to_target(
+    flight: RelativeFlight, time_s: FloatArray
+) -> tuple[FloatArray, ...]:
+    """Return ownship less target: east, north, up (m) and their three rates (m/s).
 
     East and north in the ownship's level plane and difference of altitudes, m, and their rates,
     m/s: ownship less target.
     """
-    first_s, last_s = (float(times[0]) for times in flight.present_s())
+    first_s, last_s = (float(times[0]) for times in flight.presence_start_and_end_s())
     before = np.maximum(time_s - _BASE_S, max(first_s, 0.0))
     after = np.minimum(time_s + _BASE_S, last_s)
-    return states_with_mean_velocity(flight, time_s, before, after)
+    return own_enu_with_mean_velocity(flight, time_s, before, after)
 
 
-def states_with_mean_velocity(
+def own_enu_with_mean_velocity(
     flight: RelativeFlight, time_s: FloatArray, before: FloatArray, after: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """Return `relative_states` with velocities averaged from `before` to `after`."""
+    """Return ownship less target: east, north, up (m), rates averaged over before to after."""
     here, _ = flight.states(time_s)
-    origin = position_of(here)
+    origin = lat_lon_alt_of(here)
 
     def separation_vectors(at_s: FloatArray) -> FloatArray:
-        mine, theirs = map(position_of, flight.states(at_s))
-        own, other = (north_east_up(*origin, *position) for position in (mine, theirs))
+        mine, theirs = map(lat_lon_alt_of, flight.states(at_s))
+        own, other = (north_east_up_offsets_m(*origin, *position) for position in (mine, theirs))
         return np.stack([own[1] - other[1], own[0] - other[0], mine[2] - theirs[2]])
 
     now = separation_vectors(time_s)

@@ -17,7 +17,11 @@ from components.messages.columns import ORIGIN, STATE
 from components.messages.state_tracks import is_confirmed_or_coasted
 from components.metrics.flown_flights import PlatformTracks
 from components.metrics.rows import PlatformParameters
-from components.metrics.true_states import Coverage, position_in_frame, states_in_frame
+from components.metrics.true_states import (
+    Coverage,
+    position_and_presence_in_frame,
+    states_and_presence_in_frame,
+)
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, Group, Result
@@ -117,13 +121,13 @@ class ErrorsByRange(PlatformTracks):
         state = own.at(time_s)
         origin = np.stack([np.broadcast_to(v, time_s.shape) for v in
                            (state.lat_deg, state.lon_deg, state.alt_m)])  # fmt: skip
-        error, rows, of, first_m = self._errors(columns, rows, own, targets)
+        error, rows, of, first_m = self._row_errors_and_targets(columns, rows, own, targets)
         if math.isfinite(first_m):
             values["first_track_range_nmi"] = first_m / NAUTICAL_MILE_M
         told_s = columns["time_s"][rows]
         range_m = np.full((len(targets), len(time_s)), np.inf)
         for number, target in enumerate(targets):
-            position, there = position_in_frame(target, time_s, origin)
+            position, there = position_and_presence_in_frame(target, time_s, origin)
             seen = coverage.is_covered(target, time_s) & there
             range_m[number, seen] = np.sqrt((position[:, seen] ** 2).sum(axis=0))
         for r in self.p.ranges_nmi:
@@ -138,7 +142,7 @@ class ErrorsByRange(PlatformTracks):
                 values |= {f"{n}.{r:g}": float(error[n][last]) for n in _ERRORS}
         return values
 
-    def _errors(
+    def _row_errors_and_targets(
         self, columns: Any, rows: IntArray, own: Any, targets: Sequence[Any]
     ) -> tuple[dict[str, FloatArray], IntArray, IntArray, float]:
         """Return the errors of rows by name, the rows that belong to a target, the target of each,
@@ -148,7 +152,7 @@ class ErrorsByRange(PlatformTracks):
         """
         origin = np.stack([columns[name][rows] for name in ORIGIN])
         estimate = np.stack([columns[name][rows] for name in STATE])
-        true, there = states_in_frame(targets, columns["state_s"][rows], origin)
+        true, there = states_and_presence_in_frame(targets, columns["state_s"][rows], origin)
         away_m = np.sqrt(((estimate[:3] - true[:, :3]) ** 2).sum(axis=1))
         away_m = np.where(there, away_m, np.inf)
         of = away_m.argmin(axis=0)
@@ -156,7 +160,7 @@ class ErrorsByRange(PlatformTracks):
         rows, of, origin = rows[mine], of[mine], origin[:, mine]
         true = true[of, :, np.flatnonzero(mine)].T
         apart = estimate[:, mine] - true
-        seen_from, _ = position_in_frame(own, columns["state_s"][rows], origin)
+        seen_from, _ = position_and_presence_in_frame(own, columns["state_s"][rows], origin)
         sight = true[:3] - seen_from
         with np.errstate(invalid="ignore", divide="ignore"):
             level = np.hypot(sight[0], sight[1])

@@ -14,12 +14,12 @@ from components.metrics.rows import (
     FUSED,
     TargetMetric,
     TargetParameters,
+    alphabetical_name_ranks,
     is_of_target,
-    name_ranks,
-    number_results,
+    nonnegative_result_definitions,
     select_rows,
 )
-from dsa_des.arrays.sorted_union import sorted_union
+from dsa_des.arrays.sorted_union import sorted_union_and_positions
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import FRACTION, Group, Result, blocks_recording
@@ -31,8 +31,8 @@ class _Lines:
 
     def __init__(self, columns: Any, rows: BoolArray, *names: str) -> None:
         self.rows = select_rows(columns, rows, "target", "time_s", *names)
-        target = name_ranks(self.rows["target"])
-        self.order = _order(self.rows["replica"], target, self.rows["time_s"])
+        target = alphabetical_name_ranks(self.rows["target"])
+        self.order = _sorting_indices(self.rows["replica"], target, self.rows["time_s"])
         self.replica: IntArray = self.rows["replica"][self.order]
         self.time_s: FloatArray = self.rows["time_s"][self.order]
         target = target[self.order]
@@ -43,7 +43,7 @@ class _Lines:
         self.of_gap = self.replica[self.end]
 
 
-def _order(replica: IntArray, target: IntArray, time_s: FloatArray) -> Any:
+def _sorting_indices(replica: IntArray, target: IntArray, time_s: FloatArray) -> Any:
     """Return indices that sort rows by replica, target and time; a full slice if sorted."""
     same = (replica[1:] == replica[:-1]) & (target[1:] == target[:-1])
     if bool((same & (time_s[1:] >= time_s[:-1]) | (replica[1:] > replica[:-1])).all()):
@@ -51,18 +51,22 @@ def _order(replica: IntArray, target: IntArray, time_s: FloatArray) -> Any:
     return np.lexsort((time_s, target, replica))
 
 
-def _sums(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
+def _sum_by_replica(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
     return np.bincount(replica, weights=values, minlength=count).astype(float)
 
 
-def _means(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
+def _mean_by_replica(replica: IntArray, values: FloatArray, count: int) -> FloatArray:
     many = np.bincount(replica, minlength=count)
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.asarray(np.where(many > 0, _sums(replica, values, count) / many, np.nan))
+        return np.asarray(
+            np.where(many > 0, _sum_by_replica(replica, values, count) / many, np.nan)
+        )
 
 
-def _quantiles(replica: IntArray, values: FloatArray, count: int, share: float) -> FloatArray:
-    """Return each replica's quantile, (count,): the least value >= at least `share` of values."""
+def _quantile_by_replica(
+    replica: IntArray, values: FloatArray, count: int, share: float
+) -> FloatArray:
+    """Return each replica's least value that at least `share` of its values do not exceed."""
     order = np.lexsort((values, replica))
     many = np.bincount(replica, minlength=count)
     start = np.cumsum(many) - many
@@ -90,7 +94,7 @@ class AgeOfInformation(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return the definitions of two results: the mean and the 95th percentile of the age."""
-        return number_results({
+        return nonnegative_result_definitions({
             "age_of_information_mean_s": "mean age of what the fusion holds, s",
             "age_of_information_p95_s": "age exceeded 5 % of the time, s",
         })  # fmt: skip
@@ -107,20 +111,22 @@ class AgeOfInformation(TargetMetric):
         low = lines.time_s[lines.end - 1] - origin[lines.end - 1]
         high = low + lines.gap_s
         count = len(group)
-        area = _sums(lines.of_gap, (low + high) / 2.0 * lines.gap_s, count)
-        span = _sums(lines.of_gap, lines.gap_s, count)
+        area = _sum_by_replica(lines.of_gap, (low + high) / 2.0 * lines.gap_s, count)
+        span = _sum_by_replica(lines.of_gap, lines.gap_s, count)
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = np.where(span > 0, area / span, np.nan)
         return {
             "age_of_information_mean_s": mean,
-            "age_of_information_p95_s": _ramp_quantiles(lines.of_gap, low, high, span, 0.95),
+            "age_of_information_p95_s": _ramp_quantile_by_replica(
+                lines.of_gap, low, high, span, 0.95
+            ),
         }
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the expected mean and 95th percentile of the age (s) for a single sensor that
         detects in every scan that is not lost.
         """
-        feed = only_feed(scene, self.fusion)
+        feed = feed_of_only_sensor(scene, self.fusion)
         if feed is None:
             return {}
         jitter_s = feed.clock.jitter_s
@@ -145,16 +151,16 @@ def _running_max(values: FloatArray, lines: _Lines) -> FloatArray:
     return known[highest]
 
 
-def _ramp_quantiles(
+def _ramp_quantile_by_replica(
     replica: IntArray, low: FloatArray, high: FloatArray, span: FloatArray, share: float
 ) -> FloatArray:
-    """Return each replica's age not exceeded for `share` of the time, if ages rise linearly."""
+    """Return each replica's age not exceeded for `share` of the time, as ages rise with time."""
     result = np.full(len(span), np.nan)
     for number in np.flatnonzero(span > 0).tolist():
         start, end = np.searchsorted(replica, [number, number + 1])
         lows, highs = np.sort(low[start:end]), np.sort(high[start:end])
         # Time spent at or below age x is Σ min(x, high) - min(x, low): piecewise linear in x.
-        ages, _ = sorted_union([lows, highs])
+        ages, _ = sorted_union_and_positions([lows, highs])
         below = _clipped_sums(highs, ages) - _clipped_sums(lows, ages)
         result[number] = np.interp(share * span[number], below, ages)
     return result
@@ -167,7 +173,7 @@ def _clipped_sums(ascending: FloatArray, at: FloatArray) -> FloatArray:
     return total[index] + (len(ascending) - index) * at
 
 
-def _is_updated(columns: Any, rows: BoolArray) -> BoolArray:
+def _has_new_measurement(columns: Any, rows: BoolArray) -> BoolArray:
     """Return which rows have a new measurement since that replica and target's last row (mask)."""
     if "measured_s" not in columns:  # a recording that knows ages only, from arrivals
         return rows & np.asarray(columns["age_s"] <= 0.0)
@@ -203,7 +209,7 @@ class TrackUpdates(TargetMetric):
     def results(self) -> list[Result]:
         """Return four definitions: update interval (mean, 95th percentile), continuity, breaks."""
         said = "share of a track's time that it is not broken"
-        interval, p95, breaks = number_results({
+        interval, p95, breaks = nonnegative_result_definitions({
             "track_update_interval_s": "mean time between updates of a track, s",
             "track_update_interval_p95_s": "95th percentile of it, s",
             "track_breaks": "number of breaks",
@@ -215,17 +221,21 @@ class TrackUpdates(TargetMetric):
         (share of time) and number of breaks.
         """
         columns: Any = group.tables["tracks"]
-        lines = _Lines(columns, _is_updated(columns, is_of_target(columns, self.p.target)))
+        lines = _Lines(columns, _has_new_measurement(columns, is_of_target(columns, self.p.target)))
         count = len(group)
         broken = np.maximum(lines.gap_s - self.p.break_after_s, 0.0)
-        span = _sums(lines.of_gap, lines.gap_s, count)
+        span = _sum_by_replica(lines.of_gap, lines.gap_s, count)
         with np.errstate(invalid="ignore", divide="ignore"):
-            continuity = np.where(span > 0, 1.0 - _sums(lines.of_gap, broken, count) / span, np.nan)
-        breaks = _sums(lines.of_gap, (broken > 0.0).astype(float), count)
+            continuity = np.where(
+                span > 0, 1.0 - _sum_by_replica(lines.of_gap, broken, count) / span, np.nan
+            )
+        breaks = _sum_by_replica(lines.of_gap, (broken > 0.0).astype(float), count)
         has = np.bincount(lines.replica, minlength=count) > 0
         return {
-            "track_update_interval_s": _means(lines.of_gap, lines.gap_s, count),
-            "track_update_interval_p95_s": _quantiles(lines.of_gap, lines.gap_s, count, 0.95),
+            "track_update_interval_s": _mean_by_replica(lines.of_gap, lines.gap_s, count),
+            "track_update_interval_p95_s": _quantile_by_replica(
+                lines.of_gap, lines.gap_s, count, 0.95
+            ),
             "track_continuity": continuity,
             "track_breaks": np.where(has, breaks, np.nan),
         }
@@ -233,7 +243,7 @@ class TrackUpdates(TargetMetric):
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
         """Return the mean interval for a single sensor that detects in every scan not lost."""
         fusion = blocks_recording(scene, FUSED)
-        feed = only_feed(scene, fusion[0]) if len(fusion) == 1 else None
+        feed = feed_of_only_sensor(scene, fusion[0]) if len(fusion) == 1 else None
         onward = [wire for wire in scene.wires if wire.source in fusion]
         if feed is None or any(wire.jitter_s or wire.drop_probability for wire in onward):
             return {}
@@ -253,7 +263,7 @@ class PositionError(TargetMetric):
 
     def results(self) -> list[Result]:
         """Return the error of positions (where there is a range) and of directions."""
-        return number_results({
+        return nonnegative_result_definitions({
             "fused_position_error_m": "distance to the true position, rms, m",
             "fused_angle_error_deg": "angle to the true direction, rms, deg",
         })  # fmt: skip
@@ -272,8 +282,10 @@ class PositionError(TargetMetric):
         # Law of cosines, without cancellation where the two points are close.
         square = (r - t) ** 2 + r * t * chord[ranged] ** 2
         return {
-            "fused_position_error_m": np.sqrt(_means(replica[ranged], square, count)),
-            "fused_angle_error_deg": np.degrees(np.sqrt(_means(replica, angle**2, count))),
+            "fused_position_error_m": np.sqrt(_mean_by_replica(replica[ranged], square, count)),
+            "fused_angle_error_deg": np.degrees(
+                np.sqrt(_mean_by_replica(replica, angle**2, count))
+            ),
         }
 
 
@@ -287,11 +299,11 @@ class Feed:
 
     @property
     def period_s(self) -> float:
-        """From scan to scan, at the rate at which the clock truly runs, s."""
+        """Time from scan to scan, at the rate at which the clock truly runs, s."""
         return float(self.clock.period_s / (1 + self.clock.rate_error_ppm / 1_000_000))
 
 
-def only_feed(scene: Scene, block: str) -> Feed | None:
+def feed_of_only_sensor(scene: Scene, block: str) -> Feed | None:
     """Return the `Feed` of a block's only directly connected sensor; None if there are several.
 
     None also where lateness is random or queues decide about it: no formula is known then.

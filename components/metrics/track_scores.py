@@ -227,7 +227,7 @@ class TrackTally:
 
 
 def innovation_results(nis: FloatArray, freedom: IntArray) -> dict[str, float]:
-    """Return two results by name: innovations squared per degree of freedom, share in bounds."""
+    """Return the NIS per degree of freedom and the share of NIS in the chi-square bounds."""
     inside = np.zeros(len(nis), dtype=bool)
     for many in np.unique(freedom).tolist():
         low, high = chi_square_bounds(many)
@@ -256,7 +256,7 @@ def _mean_delay_s(since: Mapping[str, float], begin_s: Mapping[str, float]) -> f
 
 
 def mean_or_nan(values: Any) -> float:
-    """Return the mean, NaN of nothing."""
+    """Return the mean of the values; NaN if there are none."""
     return float(np.mean(values)) if len(values) else float("nan")
 
 

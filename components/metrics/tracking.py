@@ -15,7 +15,7 @@ from components.messages.state_tracks import (
 from components.metrics.flown_flights import PlatformTracks
 from components.metrics.rows import PlatformParameters, is_named
 from components.metrics.track_scores import ReportedTracks, TrackTally, innovation_results
-from components.metrics.true_states import Coverage, states_in_frame
+from components.metrics.true_states import Coverage, states_and_presence_in_frame
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.scene.scene import Scene
@@ -88,7 +88,7 @@ class TrackingParameters(PlatformParameters):
     )  # fmt: skip
 
     @model_validator(mode="after")
-    def _steps(self) -> Any:
+    def _check_series_step(self) -> Any:
         if self.series_s is not None and self.series_s < self.step_s:
             raise ValueError(
                 f"series_s = {self.series_s:g} is shorter than step_s = {self.step_s:g}, the time "
@@ -203,10 +203,10 @@ class Tracking(PlatformTracks):
         grid = np.arange(self.p.step_s, duration_s + 1e-9, self.p.step_s)
         grid = grid[grid >= self.p.from_s]
         kept = confirmed & np.asarray(columns["has_range"], dtype=bool)  # of no rows it has no type
-        key = _track_keys(columns)
+        key = _unique_track_number_of_rows(columns)
         first, confirmed_row = np.unique(key[rows[kept[rows]]], return_index=True)
         confirmed_s = columns["time_s"][rows[kept[rows]][confirmed_row]]
-        instant, row = _reports_valid_at(columns, rows, grid)
+        instant, row = _valid_instant_row_pairs(columns, rows, grid)
         instant, row = instant[kept[row]], row[kept[row]]
         order = np.lexsort((row, instant))
         instant, row = instant[order], row[order]
@@ -216,10 +216,10 @@ class Tracking(PlatformTracks):
         origin = np.stack([columns[name][row] for name in ORIGIN])
         since_s, state_s = grid[instant] - columns["time_s"][row], columns["state_s"][row]
         as_reported = np.full((len(targets), *state.shape), np.nan)
-        true, _ = states_in_frame(targets, state_s[is_new], origin[:, is_new])
+        true, _ = states_and_presence_in_frame(targets, state_s[is_new], origin[:, is_new])
         as_reported[:, :, is_new] = state[:, is_new] - true
         state[:3] += state[3:] * since_s
-        error = state - states_in_frame(targets, state_s + since_s, origin)[0]
+        error = state - states_and_presence_in_frame(targets, state_s + since_s, origin)[0]
         covariance = np.moveaxis(covariance_matrices(columns, row), -1, 0)
         there = [np.broadcast_to(t.at(grid).present, grid.shape) for t in targets]
         present = np.array(there, dtype=bool).reshape(len(targets), len(grid))
@@ -239,7 +239,7 @@ class Tracking(PlatformTracks):
         kept = (columns["nis_freedom"][rows] > 0) & (columns["state_s"][rows] >= self.p.from_s)
         rows = rows[kept]
         # A look that is worked on again, after an out-of-sequence one, is reported again.
-        track, when = _track_keys(columns)[rows], columns["state_s"][rows]
+        track, when = _unique_track_number_of_rows(columns)[rows], columns["state_s"][rows]
         order = np.lexsort((when, track))
         same = (np.diff(track[order]) == 0) & (np.diff(when[order]) == 0)
         rows = rows[order[np.append(~same, np.ones(min(len(rows), 1), dtype=bool))]]
@@ -250,13 +250,15 @@ def _nees_column_name(end_s: float, of: str) -> str:
     return f"track_nees.time_s{of}.{end_s:g}"
 
 
-def _track_keys(columns: Any) -> IntArray:
+def _unique_track_number_of_rows(columns: Any) -> IntArray:
     """Return a number for each row that is unique for its block and track."""
     track = np.asarray(columns["track"], dtype=np.int64)
     return columns["block"].codes * (track.max(initial=0) + 1) + track
 
 
-def _reports_valid_at(columns: Any, rows: IntArray, grid: FloatArray) -> tuple[IntArray, IntArray]:
+def _valid_instant_row_pairs(
+    columns: Any, rows: IntArray, grid: FloatArray
+) -> tuple[IntArray, IntArray]:
     """Return pairs as two arrays: the index of a grid instant and a row that is valid at it.
 
     A report stands from its own instant until its block's next one. A block reports all of its

@@ -10,11 +10,11 @@ from components.geometry import (
     body_angles_unchecked,
     line_of_sight_ned,
     ned_to_body_unchecked,
-    north_east_up,
+    north_east_up_offsets_m,
 )
 from components.messages.detections import SensorOffer
 from components.messages.reach import EVALUATE, Reach
-from components.metrics.separation import position_of, traffic_and_duration
+from components.metrics.separation import lat_lon_alt_of, traffic_and_duration
 from dsa_des.arrays.types import BoolArray, FloatArray
 from dsa_des.block.component import Context
 from dsa_des.scene.scene import Scene
@@ -26,30 +26,30 @@ _STEP_S = 0.02
 _WELL_S = 1e-3
 
 
-def position_in_frame(
+def position_and_presence_in_frame(
     flight: Any, time_s: FloatArray, origin: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Return north, east and down (3, n) of an aircraft, m, and whether it is there.
+    """Return an aircraft's north, east, down (3, n), m, and a mask (n,): True if present.
 
     The origin (3, n) is latitude, longitude (deg) and height (m) of the frame at each time.
     """
     state = flight.at(time_s)
-    north, east, up = north_east_up(*origin, *position_of(state))
+    north, east, up = north_east_up_offsets_m(*origin, *lat_lon_alt_of(state))
     return np.stack([north, east, -up]), np.broadcast_to(state.present, time_s.shape)
 
 
-def states_in_frame(
+def states_and_presence_in_frame(
     flights: Sequence[Any], time_s: FloatArray, origin: FloatArray
 ) -> tuple[FloatArray, BoolArray]:
     """Return positions and velocities (flights, 6, n), m and m/s, and presence (flights, n)."""
     state = np.empty((len(flights), 6, len(time_s)))
     present = np.empty((len(flights), len(time_s)), dtype=bool)
     for number, flight in enumerate(flights):
-        state[number, :3], present[number] = position_in_frame(flight, time_s, origin)
+        state[number, :3], present[number] = position_and_presence_in_frame(flight, time_s, origin)
         before = np.maximum(time_s - _STEP_S, 0.0)
         after = before + 2.0 * _STEP_S
-        first, _ = position_in_frame(flight, before, origin)
-        last, _ = position_in_frame(flight, after, origin)
+        first, _ = position_and_presence_in_frame(flight, before, origin)
+        last, _ = position_and_presence_in_frame(flight, after, origin)
         state[number, 3:] = (last - first) / (after - before)
     return state, present
 
@@ -64,7 +64,7 @@ class TargetsInFrame:
     def position(self, flight: Any, time_s: FloatArray) -> FloatArray:
         """Return an aircraft's position (north, east, down), (3, n), m; NaN where absent."""
         origin = np.repeat(self._origin[:, np.newaxis], len(time_s), axis=1)
-        position, there = position_in_frame(flight, time_s, origin)
+        position, there = position_and_presence_in_frame(flight, time_s, origin)
         return np.where(there, position, np.nan)
 
     def positions_at(self, time_s: FloatArray) -> FloatArray:
@@ -118,7 +118,7 @@ class Coverage:
         ends = [
             np.ascontiguousarray(np.broadcast_to(value, time_s.shape))
             for state in (own, other)
-            for value in position_of(state)
+            for value in lat_lon_alt_of(state)
         ]
         north, east, down = line_of_sight_ned(*ends)
         attitude = [np.broadcast_to(v, time_s.shape) for v in (own.yaw_rad, own.pitch_rad,

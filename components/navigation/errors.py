@@ -19,7 +19,7 @@ from components.arguments.checks import (
     HIGHEST_ALTITUDE_M,
     LOWEST_ALTITUDE_M,
     broadcast_flat,
-    finite,
+    check_finite,
     require_between,
     unflatten,
 )
@@ -40,14 +40,14 @@ from components.messages.targets import RelativeTargets, TrafficStates
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Built, Effect, Hook, Verdict
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import ticks_to_nanoseconds
 from dsa_des.time.gauss_markov import GaussMarkov
 
 # Beyond this a displacement along the tangent plane would no longer be a small error.
 LARGEST_POSITION_ERROR_M = 100_000.0
 
 
-def displaced_position(
+def displaced_lat_lon_alt(
     lat_deg: ArrayLike,
     lon_deg: ArrayLike,
     alt_m: ArrayLike,
@@ -66,7 +66,7 @@ def displaced_position(
     given = {"lat_deg": lat_deg, "lon_deg": lon_deg, "alt_m": alt_m,
              "north_m": north_m, "east_m": east_m, "down_m": down_m}  # fmt: skip
     shape, (lat, lon, alt, *errors) = broadcast_flat(
-        **{name: finite(name, value) for name, value in given.items()}
+        **{name: check_finite(name, value) for name, value in given.items()}
     )
     require_between("lat_deg", lat, -90.0, 90.0, "lie in [-90, 90] degrees")
     lowest, highest = LOWEST_ALTITUDE_M, HIGHEST_ALTITUDE_M
@@ -134,7 +134,7 @@ def has_navigation_errors(context: Context) -> bool:
     return bool(_nonzero_error_texts(context))
 
 
-def navigation_noise_deviations(context: Context) -> tuple[Three, Three]:
+def position_and_attitude_deviations(context: Context) -> tuple[Three, Three]:
     """Return the standard deviations that the navigation states: of position (north, east, down; m)
     and attitude (yaw, pitch, roll; rad).
     """
@@ -151,7 +151,7 @@ def lasting_navigation_errors(context: Context) -> dict[str, list[LastingPart]]:
     the greatest.
     """
     navigation = context.sections["navigation"]
-    position_m, attitude_rad = navigation_noise_deviations(context)
+    position_m, attitude_rad = position_and_attitude_deviations(context)
     angle: list[LastingPart] = []
     along: list[LastingPart] = []
     if lasts_s := navigation.attitude_correlation_time_s:
@@ -212,7 +212,7 @@ class NavigationErrors(_Navigation[Believing]):
 
         def believed(states: TrafficStates) -> Belief:
             # An instant may take more bits than a scan number has: the rest goes to the target.
-            instant = nanosecond_of(states.tick, block.context.ticks_per_s)
+            instant = ticks_to_nanoseconds(states.tick, block.context.ticks_per_s)
             high = (instant >> _SCAN_BITS).astype(np.uint64)
             low = instant & ((1 << _SCAN_BITS) - 1)
             drawn = stream.of_runs(states.run, instant)
@@ -231,7 +231,7 @@ class NavigationErrors(_Navigation[Believing]):
                 )
             errors = [bias[k] + noise[k] * normal for k, normal in enumerate(normals)]
             true = states.own_lat_deg, states.own_lon_deg
-            position = displaced_position(*true, states.own_alt_m, *errors[:3])
+            position = displaced_lat_lon_alt(*true, states.own_alt_m, *errors[:3])
             # How it is turned it knows from where it believes north to be.
             near = np.abs(true[0]) > NEAR_A_POLE_DEG
             turned = np.where(near, meridian_convergence_rad(true, position[:2]), 0.0)
@@ -253,19 +253,23 @@ class NavigationReport(_Navigation[ReportTransform]):
         """Return a function that adds horizon angles and the navigation's variances to a report."""
         none = (0.0, 0.0, 0.0)
         noise = (
-            navigation_noise_deviations(block.context) if block.turned_by_belief else (none, none)
+            position_and_attitude_deviations(block.context)
+            if block.turned_by_belief
+            else (none, none)
         )
 
         def report(detections: Detections, targets: RelativeTargets, rows: IntArray) -> Detections:
-            return add_navigation_variances(add_horizon_angles(detections, targets, rows), *noise)
+            return add_navigation_variances(
+                add_angles_in_believed_ned(detections, targets, rows), *noise
+            )
 
         return report
 
 
-def add_horizon_angles(
+def add_angles_in_believed_ned(
     detections: Detections, targets: RelativeTargets, rows: IntArray
 ) -> Detections:
-    """Return the detections with azimuth and elevation in north-east-down axes added, by the
+    """Return detections with azimuth from north and elevation over the horizon added, by the
     believed attitude; unchanged without a pose.
     """
     own = detections.pose_columns()
@@ -285,7 +289,7 @@ def add_horizon_angles(
 def add_navigation_variances(
     detections: Detections, position_m: Three, attitude_rad: Three
 ) -> Detections:
-    """Return detections with navigation's variance added to azimuth, elevation and range's."""
+    """Return detections whose angle and range variances include those of the navigation."""
     own = detections.pose_columns()
     if not own or not (any(position_m) or any(attitude_rad)) or not len(detections.target):
         return detections

@@ -81,10 +81,10 @@ class Console(Component):
         index = 0
         made = []
         for tick, decision in self.due_decisions(wake):
-            index = self._take_alerts(came, index, tick)
+            index = self._apply_alerts_until_tick(came, index, tick)
             taken = self._schedule_command(tick / self.context.ticks_per_s, decision)
             made.append((tick, decision, self._alerts.get(decision.target), taken))
-        self._take_alerts(came, index, None)
+        self._apply_alerts_until_tick(came, index, None)
         if not made:
             return None
         sent = self._messages(made)
@@ -112,8 +112,10 @@ class Console(Component):
         self._told[decision.kind] = taken
         return taken
 
-    def _take_alerts(self, came: list[Arrivals], row: int, until: int | None) -> int:
-        """Update the alerts by rows from `row` to tick `until` (None: all); return the next row."""
+    def _apply_alerts_until_tick(self, came: list[Arrivals], row: int, until: int | None) -> int:
+        """Update the active alerts from row `row` up to tick `until` (None: to the end) and return
+        the next row.
+        """
         for arrived in came:  # one wire
             alerts: AlertLevels = arrived.message
             rows = len(alerts)

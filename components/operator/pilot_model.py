@@ -70,7 +70,7 @@ class Draws(NamedTuple):
     size: float
 
 
-def commanded_change(
+def commanded_change_out_of_band(
     changes: tuple[float, float], turns: bool, draws: Draws | None, goes_beyond: bool = True
 ) -> float:
     """Return the change of track (rad, positive right) or altitude (m, positive up) that a pilot
@@ -97,7 +97,7 @@ def commanded_change(
     return size if to_high else -size
 
 
-def response_delays_s(
+def reaction_and_execution_delays_s(
     uniforms: Sequence[float] | None, initial_s: float, coordination_s: float, execution_s: float
 ) -> tuple[float, float]:
     """Return the delay of reaction and coordination, and the delay of execution after it, s."""

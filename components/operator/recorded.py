@@ -16,7 +16,7 @@ from dsa_des.block.component import ScenePath
 from dsa_des.block.wake import Wake
 from dsa_des.errors import did_you_mean
 from dsa_des.files.input_files import InputFileError, read_input_bytes, read_input_text
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 _NAMES = ("time_s", "decision", "target", "turn_rad", "climb_m", "wall_time_s")
 _MOST_PROBLEMS = 5
@@ -119,7 +119,7 @@ def _check_names(path: Path, names: Iterable[str]) -> None:
 
 def _located_message(where: str, problem: Any) -> str:
     name = ".".join(str(part) for part in problem["loc"])
-    value = shorten(printable(str(problem["input"])), 60)
+    value = shorten(escape_unprintable(str(problem["input"])), 60)
     return f"{where}: {name} is {value!r}: {problem['msg'].lower()}"
 
 

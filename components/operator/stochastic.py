@@ -13,18 +13,18 @@ from components.messages.alerts import AlertLevels
 from components.messages.steering import SLOWEST_TURN_DEG_S, Manoeuvre, Manoeuvres
 from components.operator.pilot_model import (
     Draws,
-    commanded_change,
+    commanded_change_out_of_band,
     decision_pause_s,
     mean_decision_pause_s,
-    response_delays_s,
+    reaction_and_execution_delays_s,
 )
 from dsa_des.arrays.keyed_table import indices_by_occurrence
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output
 from dsa_des.block.ladder import Verified
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
+from dsa_des.time.clock import ticks_to_nanoseconds
 
 
 class StochasticParameters(ConfParameters):
@@ -289,7 +289,7 @@ class Stochastic(Component):
             return [None] * len(minds)
         decisions = np.array([mind.decisions for mind in minds], dtype=np.int64)
         runs = np.array([mind.run for mind in minds], dtype=np.int64)
-        drawn = stream.of_runs(runs, nanosecond_of(ticks, self.context.ticks_per_s))
+        drawn = stream.of_runs(runs, ticks_to_nanoseconds(ticks, self.context.ticks_per_s))
         zero = np.zeros(len(minds), dtype=np.uint64)
         draws: list[list[float]] = np.stack(
             [drawn.uniform(zero, decisions, number) for number in range(count)], axis=-1
@@ -304,7 +304,9 @@ class Stochastic(Component):
             initial_s = coordination_s = 0.0
         elif highest >= self.p.warning_level:
             coordination_s = 0.0
-        return response_delays_s(draws, initial_s, coordination_s, self.p.execution_delay_s)
+        return reaction_and_execution_delays_s(
+            draws, initial_s, coordination_s, self.p.execution_delay_s
+        )
 
     def _chosen_manoeuvres(
         self, alerts: AlertLevels, acting: Sequence[tuple[int, Mind]]
@@ -336,7 +338,9 @@ class Stochastic(Component):
                     change = 0.0
                     if changes is not None:
                         needed.add(row)
-                        change = commanded_change(changes, is_turn, draws[row], self.p.goes_beyond)
+                        change = commanded_change_out_of_band(
+                            changes, is_turn, draws[row], self.p.goes_beyond
+                        )
                     if change != 0.0 and is_turn:
                         result[row] = self._turn(change, alerts, row)
                     elif change != 0.0:
@@ -345,7 +349,7 @@ class Stochastic(Component):
                         )
         due = np.array(sorted(needed), dtype=np.int64)
         stuck = np.array([row not in result for row in due.tolist()], dtype=bool)
-        self._stuck = add_cases(self._stuck, alerts.run[due[stuck]], alerts.run[due])
+        self._stuck = counts_with_cases_added(self._stuck, alerts.run[due[stuck]], alerts.run[due])
         return result
 
     def _turn(self, change: float, alerts: AlertLevels, row: int) -> Manoeuvre:

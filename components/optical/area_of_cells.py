@@ -12,8 +12,12 @@ from components.aircraft.aircraft import Roster
 from components.aircraft.aspect_tables import SilhouetteTable
 from components.optical.infrared_area import infrared_area
 from components.optical.mesh import TriangleMesh
-from components.optical.silhouette import PLATE_ASPECT_RATIO, union_area, visible_area
-from components.sensor.look import Cells, aspect_angles_of_cells
+from components.optical.silhouette import (
+    PLATE_ASPECT_RATIO,
+    exact_area_of_bodies_union,
+    visible_area,
+)
+from components.sensor.look import Cells, aspect_pitch_roll_elevation_rad
 from dsa_des.arrays.types import FloatArray
 
 
@@ -40,7 +44,7 @@ def area_by_table(cells: Cells, of_target: Mapping[str, Sequence[Any]], model: s
     for index, item in enumerate(distinct):
         chosen = np.flatnonzero(which[cells.craft] == index)
         area[chosen] = visible_area(
-            *aspect_angles_of_cells(cells, chosen),
+            *aspect_pitch_roll_elevation_rad(cells, chosen),
             model=model,
             **{kind: item},
         )
@@ -70,7 +74,7 @@ def silhouette_table_of_bodies(
 
     # An observer who stands at this azimuth and elevation of a level target looks along the
     # opposite direction: at minus his elevation, and nose-on is a relative heading of pi.
-    area = union_area(
+    area = exact_area_of_bodies_union(
         np.pi - np.radians(azimuth), level, level, -np.radians(elevation),
         filled(front_m2), filled(side_m2), filled(horizontal_m2),
         None if back_m2 is None else filled(back_m2),
@@ -81,17 +85,20 @@ def silhouette_table_of_bodies(
 
 
 @lru_cache(maxsize=64)
-def body_mesh(front_m2: float, side_m2: float, horizontal_m2: float) -> TriangleMesh:
+def capsule_and_plate_mesh(front_m2: float, side_m2: float, horizontal_m2: float) -> TriangleMesh:
     """Return a closed triangle mesh of the capsule and the plate that have these areas."""
     if min(front_m2, side_m2, horizontal_m2) <= 0.0:
         raise ValueError("an aircraft without front, side or horizontal area has no mesh")
-    bodies = [_capsule(front_m2, side_m2), _plate(horizontal_m2)]
+    bodies = [
+        _capsule_vertices_and_faces(front_m2, side_m2),
+        _plate_vertices_and_faces(horizontal_m2),
+    ]
     count = len(bodies[0][0])
     vertices = np.concatenate([vertices for vertices, _ in bodies])
     return TriangleMesh(vertices, np.concatenate([bodies[0][1], bodies[1][1] + count]), MESH_ROWS)
 
 
-def _capsule(front_m2: float, side_m2: float) -> tuple[FloatArray, np.ndarray]:
+def _capsule_vertices_and_faces(front_m2: float, side_m2: float) -> tuple[FloatArray, np.ndarray]:
     """Return vertices and faces of a capsule along the x axis."""
     radius = np.sqrt(front_m2 / np.pi)
     half_length = side_m2 / (4.0 * radius)
@@ -115,7 +122,7 @@ def _capsule(front_m2: float, side_m2: float) -> tuple[FloatArray, np.ndarray]:
     return np.array(points), np.array(faces)
 
 
-def _plate(horizontal_m2: float) -> tuple[FloatArray, np.ndarray]:
+def _plate_vertices_and_faces(horizontal_m2: float) -> tuple[FloatArray, np.ndarray]:
     span = np.sqrt(horizontal_m2 * PLATE_ASPECT_RATIO)
     half = 0.5 * np.array([horizontal_m2 / span, span, _PLATE_THICKNESS_M])
     signs = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
@@ -185,11 +192,11 @@ def area_of_cells(cells: Cells, band: str, silhouette: str) -> FloatArray:
     if silhouette == "mesh":
         check_silhouette(cells.roster, band, silhouette)
         bodies = zip(*(areas[key] for key in _BODIES), strict=True)
-        meshes = [body_mesh(*map(float, body)) for body in bodies]
+        meshes = [capsule_and_plate_mesh(*map(float, body)) for body in bodies]
         return area_by_table(cells, {"mesh": meshes}, "convex_hull")
     compute: Any = infrared_area if band == "ir" else visible_area
-    view = aspect_angles_of_cells(cells)
-    shown = {name: cells.of_target(column) for name, column in areas.items()}
+    view = aspect_pitch_roll_elevation_rad(cells)
+    shown = {name: cells.column_at_targets(column) for name, column in areas.items()}
     if len(cells) <= CELLS_AT_ONCE:
         small: FloatArray = compute(*view, model=silhouette, validate=False, **shown)
         return small

@@ -27,7 +27,7 @@ from components.optical.detector import (
     CameraDetector,
     centroid_variance,
     derive_detector,
-    farthest_detection_m,
+    detection_range_bound_m,
 )
 from components.optical.infrared_area import AREA
 from components.optical.signature import SIGNATURE, DynamicSignature, pixels_of_cells
@@ -125,7 +125,7 @@ class CameraParameters(GlintParameters, SensorParameters):
         said = super().ineffective_key_notes()
         if self.noise_equivalent_contrast == 0 and self.errors != "signal":
             said += self.note_ineffective("blur_pixels", because="there is no noise")
-        if not self.reports_noise:
+        if not self.has_false_alarms:
             said += self.note_ineffective(
                 "marked_false_alarms", because="no false alarms are reported"
             )
@@ -153,17 +153,17 @@ class CameraParameters(GlintParameters, SensorParameters):
         return self
 
     @property
-    def reports_noise(self) -> bool:
+    def has_false_alarms(self) -> bool:
         """Return whether its reports contain false alarms."""
         if self.false_alarms is not None:
             return self.false_alarms
         if self.false_alarms_per_frame is not None:
             return self.false_alarms_per_frame > 0.0
-        return self.states_false_alarms
+        return self.has_implied_false_alarms
 
     @property
-    def states_false_alarms(self) -> bool:
-        """Whether two other keys, such as threshold and noise, give the number of false alarms."""
+    def has_implied_false_alarms(self) -> bool:
+        """Return whether other keys imply a number of false alarms, as threshold with noise."""
         others = self.threshold, self.noise_equivalent_contrast, self.calibrate
         if self.noise_equivalent_contrast == 0.0 or others.count(None) != 1:
             return False
@@ -214,13 +214,13 @@ class Camera(Sensor):
     @cached_property
     def detector(self) -> CameraDetector:
         """The camera's threshold and noise, derived from those keys that the scene states."""
-        places = max(1, round(self.all_pixels / self.spot_pixels))
+        places = max(1, round(self.all_pixels / self.point_spread_pixels))
         return derive_detector(
-            self, places, self._static_weight_or_one * math.sqrt(self.spot_pixels)
+            self, places, self._static_weight_or_one * math.sqrt(self.point_spread_pixels)
         )
 
     @cached_property
-    def spot_pixels(self) -> float:
+    def point_spread_pixels(self) -> float:
         """Number of pixels over which the picture of a point is spread."""
         return noise_equivalent_pixels(self.p.blur_pixels)
 
@@ -244,11 +244,11 @@ class Camera(Sensor):
         if self.built_one(DARKNESS):
             self.reach = replace(self.reach, enabled=False)
         if not self.context.simulate_everything:
-            farthest_m = farthest_detection_m(self, self.areas, self.contrasts)
+            farthest_m = detection_range_bound_m(self, self.areas, self.contrasts)
             nearer_m = min(self.reach.range_max_m, farthest_m)
             self.reach = replace(self.reach, range_max_m=nearer_m)
 
-    def exact_because(self) -> str:
+    def why_exact_line_of_sight(self) -> str:
         """Return why this camera needs an exact line of sight; an empty string if it does not."""
         if self.detector.noise and "detection_probability" in self.context.tolerance:
             return f"no bound is proven for the Pd of {self.name}"
@@ -284,7 +284,7 @@ class Camera(Sensor):
         return self.pixel_azimuth_rad, self.pixel_elevation_rad
 
     @property
-    def contrast_column(self) -> str:
+    def contrast_column_name(self) -> str:
         """Name of the roster column with the contrast that this camera uses."""
         return self.contrasts
 
@@ -338,13 +338,15 @@ class Camera(Sensor):
         return Look(seen, margin, extras, self.signal_from_signature(sample, np.ones(len(cells))))
 
     def counted_signature_share(self, pixels: FloatArray) -> FloatArray:
-        """Return the share of the signature that counts after the filter; 1 without noise."""
+        """Return the share of a signature that is left after the filter; 1 without noise."""
         silent = self.p.noise_equivalent_contrast == 0.0
-        return np.ones_like(pixels) if silent else point_filter_share(pixels, self.spot_pixels)
+        return (
+            np.ones_like(pixels) if silent else point_filter_share(pixels, self.point_spread_pixels)
+        )
 
-    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return a detection's recorded columns; with noise measured pixels instead of Pd."""
-        extras = dict(super()._extras(cells, look))
+    def _extra_columns(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+        """Return the columns recorded by detection; with noise, measured pixels and no Pd."""
+        extras = dict(super()._extra_columns(cells, look))
         if self.detector.noise:
             extras["pixels"] = look.signal["pixels"]
             extras.pop("detection_probability", None)
@@ -381,7 +383,7 @@ class Camera(Sensor):
 
     def signal_variances(self, signal: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
         """Return the variances of the measured azimuth and elevation of a target's centre, rad²."""
-        of_contrast = self._static_weight_or_one * math.sqrt(self.spot_pixels)
+        of_contrast = self._static_weight_or_one * math.sqrt(self.point_spread_pixels)
         ratio = signal["contrast"] * (of_contrast / self.detector.noise)
         variance = centroid_variance(signal["pixels"], ratio, self.p.blur_pixels)
         return {
@@ -390,13 +392,14 @@ class Camera(Sensor):
         }
 
     def possible_false_alarm_contrasts(self, roster: Roster) -> FloatArray:
-        """Return the distinct contrast gains of targets above 0 for false alarms, else 1.
+        """Return the distinct contrasts above 0 that a false alarm may have; [1] if noise is
+        measured or no target has one.
 
         A signature that is measured with noise does not say of which contrast it is.
         """
-        if self.detector.noise or not self.contrast_column or not len(roster):
+        if self.detector.noise or not self.contrast_column_name or not len(roster):
             return np.ones(1)
-        found = np.unique(roster.column(self.contrast_column))
+        found = np.unique(roster.column(self.contrast_column_name))
         return found[found > 0.0] if (found > 0.0).any() else np.ones(1)
 
     def signal_from_signature(
@@ -405,5 +408,5 @@ class Camera(Sensor):
         """Return the targets' pixels and contrast, if size alone made the signatures (eq. 18)."""
         pixels = np.maximum(signature, 0.0) / (self._static_weight_or_one * contrast)
         if self.p.noise_equivalent_contrast != 0.0:
-            pixels = pixels_for_filtered_count(pixels, self.spot_pixels)
+            pixels = pixels_for_filtered_count(pixels, self.point_spread_pixels)
         return {"pixels": np.minimum(pixels, self.all_pixels), "contrast": contrast}

@@ -8,7 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, check_not_negative, positive, unflatten
+from components.arguments.checks import (
+    broadcast_flat,
+    check_not_negative,
+    check_positive,
+    unflatten,
+)
 from components.atmosphere.visibility import KOSCHMIEDER
 from components.geometry import angle_between
 from components.optical.luminance import background_luminance, inherent_contrast, target_luminance
@@ -87,7 +92,7 @@ def visibility_transmission(range_m: ArrayLike, visibility_m: ArrayLike) -> Any:
     """
     shape, (distance, visibility) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        visibility_m=positive("visibility_m", visibility_m),
+        visibility_m=check_positive("visibility_m", visibility_m),
     )
     # From 200 visibilities on nothing is left that a double could hold.
     gone = distance * (1.0 / 200.0) >= visibility
@@ -126,7 +131,7 @@ class Background(Effect[CellValues]):
                 model="daylight",
                 azimuth_rad=cells.azimuth_rad,
                 elevation_rad=cells.elevation_rad,
-                paint_reflectance=cells.of_target(cells.roster.column("paint_reflectance")),
+                paint_reflectance=cells.column_at_targets(cells.roster.column("paint_reflectance")),
                 ground_reflectance=p.ground_reflectance,
                 sky=p.sky,
                 background=background,
@@ -140,7 +145,7 @@ class Background(Effect[CellValues]):
 
         def factor(cells: Cells) -> FloatArray:
             # From up here there is sky down to the dip of the horizon.
-            dip = horizon_dip_rad(cells.of_row("own_alt_m") - surface_m, refraction)
+            dip = horizon_dip_rad(cells.field_at_rows("own_alt_m") - surface_m, refraction)
             sky, ground = (gain_against(cells, name) for name in ("sky", "ground"))
             return np.where(cells.elevation_rad >= -dip, sky, ground)
 

@@ -17,9 +17,9 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
-    finite,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
@@ -28,7 +28,7 @@ from components.messages.false_detections import add_false_detections, sort_by_m
 from components.radar.detection.detector_output import false_alarm_count
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import ticks_to_nanoseconds
 
 _NORMAL = NormalDist()
 _PIXEL_VARIANCE = 1.0 / 12.0
@@ -45,12 +45,12 @@ def noise_equivalent_pixels(blur_pixels: float) -> float:
     of measurement of star images on a pixel array, Publications of the Astronomical Society of the
     Pacific 95, 1983.
     """
-    blur = float(positive("blur_pixels", blur_pixels))
+    blur = float(check_positive("blur_pixels", blur_pixels))
     return 4.0 * math.pi * (blur**2 + _PIXEL_VARIANCE)
 
 
 def point_filter_share(pixels: FloatArray, spot: float) -> FloatArray:
-    """Return the share of a signature that counts if noise is that of a point's matched filter.
+    """Return the factor (0 to 1) by which a target of many pixels stands out less than a point.
 
     A filter that fits a target of N pixels lets in the noise of the pixels of its blur and of its
     own, sqrt(spot + N) of a pixel's in place of sqrt(spot): its signal stands out by that much
@@ -73,8 +73,8 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
     from scipy.special import ndtr
 
     shape, (level, needed, deviation) = broadcast_flat(
-        signature=finite("signature", signature),
-        threshold=finite("threshold", threshold),
+        signature=check_finite("signature", signature),
+        threshold=check_finite("threshold", threshold),
         noise=check_not_negative("noise", noise),
     )
     silent = deviation == 0.0
@@ -84,12 +84,12 @@ def detection_probability(signature: ArrayLike, threshold: ArrayLike, noise: Arr
 
 
 def deviations_of_exceedance(probability: float) -> float:
-    """Return how many standard deviations Gaussian noise exceeds with some probability."""
+    """Return the level, in standard deviations, that Gaussian noise exceeds so often."""
     return -_NORMAL.inv_cdf(probability)
 
 
 def exceeding_probability(deviations: float) -> float:
-    """Return the probability with which Gaussian noise exceeds so many standard deviations."""
+    """Return the probability that Gaussian noise exceeds a level in standard deviations."""
     return 0.5 * math.erfc(deviations / math.sqrt(2.0))
 
 
@@ -107,15 +107,15 @@ def false_alarm_direction(
 
     Evenly over azimuth and elevation, as pixels are; not over solid angle.
     """
-    width = finite("azimuth_width_rad", azimuth_width_rad)
+    width = check_finite("azimuth_width_rad", azimuth_width_rad)
     good = (width > 0.0) & (width <= 2.0 * np.pi * (1.0 + 1e-12))
     refuse("azimuth_width_rad", width, ~good, "be in (0, 2π]")
-    lowest = finite("lowest_elevation_rad", lowest_elevation_rad)
-    highest = finite("highest_elevation_rad", highest_elevation_rad)
+    lowest = check_finite("lowest_elevation_rad", lowest_elevation_rad)
+    highest = check_finite("highest_elevation_rad", highest_elevation_rad)
     refuse(
         "highest_elevation_rad", highest, ~(highest >= lowest), "be at least the lowest elevation"
     )
-    start = finite("azimuth_start_rad", azimuth_start_rad)
+    start = check_finite("azimuth_start_rad", azimuth_start_rad)
     shape, (across, upwards) = broadcast_flat(
         azimuth_uniform=_check_unit_interval("azimuth_uniform", azimuth_uniform),
         elevation_uniform=_check_unit_interval("elevation_uniform", elevation_uniform),
@@ -128,8 +128,8 @@ def false_alarm_direction(
 def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float) -> Any:
     """Return signatures of false alarms from uniform numbers: noise that reaches the threshold."""
     draws = _check_unit_interval("uniform", uniform)
-    level = max(float(finite("threshold", threshold)), 0.0)
-    deviation = float(positive("noise", noise))
+    level = max(float(check_finite("threshold", threshold)), 0.0)
+    deviation = float(check_positive("noise", noise))
     tail = exceeding_probability(level / deviation)
     # One by one: there are few, and the library's quantile is good to the last places.
     found = [
@@ -139,7 +139,7 @@ def false_alarm_signature(uniform: ArrayLike, *, threshold: float, noise: float)
 
 
 def _check_unit_interval(name: str, value: ArrayLike) -> Any:
-    array = finite(name, value)
+    array = check_finite(name, value)
     refuse(name, array, ~((array >= 0.0) & (array < 1.0)), "be in [0, 1)")
     return array
 
@@ -164,7 +164,7 @@ class AddedFalseAlarms:
 
     def __init__(self, block: Any) -> None:
         self._block = block
-        self._reports = block.p.reports_noise and block.p.enabled
+        self._reports = block.p.has_false_alarms and block.p.enabled
         rate = block.detector.false_alarms
         if self._reports and rate > MOST_PER_FRAME:
             found = block.detector
@@ -187,7 +187,7 @@ class AddedFalseAlarms:
     def _add_false_alarms(self, detections: Detections, marked: bool) -> Detections:
         block, reach = self._block, self._block.reach
         found = block.detector
-        now_ns = nanosecond_of(detections.tick, block.context.ticks_per_s)
+        now_ns = ticks_to_nanoseconds(detections.tick, block.context.ticks_per_s)
         every = self._draws.of_runs(detections.run, now_ns)
         count = false_alarm_count(
             every.uniform(_NO_TARGET, detections.scan, _HOW_MANY),
@@ -247,7 +247,7 @@ class FrameFalseAlarms(Effect[ReportTransform]):
             return Verdict(False, "enabled is false")
         if p.false_alarms is not None:
             return Verdict.of_flag(p, "false_alarms")
-        if p.false_alarms_per_frame is None and p.states_false_alarms:
+        if p.false_alarms_per_frame is None and p.has_implied_false_alarms:
             return Verdict(True, "two other keys say how many there are")
         if p.false_alarms_per_frame is None:
             return Verdict(False, "neither false_alarms nor false_alarms_per_frame is given")

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 
 from components.aircraft.aircraft import Aircraft, InfraredAreas, Roster
 from components.aircraft.known_targets import offered_rosters
-from components.arguments.checks import check_not_negative, positive
+from components.arguments.checks import check_not_negative, check_positive
 from components.optical.contrast import CONTRAST, visibility_transmission
 from components.optical.detection import (
     FAINTEST_DEVIATIONS,
@@ -41,7 +41,7 @@ def centroid_variance(
     """
     covered = np.asarray(check_not_negative("pixels", pixels))
     ratio = np.asarray(check_not_negative("contrast_to_noise", contrast_to_noise))
-    blur = float(positive("blur_pixels", blur_pixels))
+    blur = float(check_positive("blur_pixels", blur_pixels))
     spread = blur**2 + _PIXEL_VARIANCE * covered + _PIXEL_VARIANCE
     most = _PIXEL_VARIANCE * (covered + 1.0)
     signal2 = (covered * ratio) ** 2
@@ -130,7 +130,7 @@ def derive_detector(camera: Any, places: int, noise_of_contrast: float) -> Camer
         )
     noise = None if contrast is None else noise_of_contrast * contrast
     if known is not None:
-        signature = calibrated_signature(camera, known)
+        signature = signature_at_calibration_range(camera, known)
         above = -deviations_of_exceedance(known.pd)
         if noise is not None:
             threshold = signature - above * noise
@@ -199,11 +199,11 @@ class _OneLook:
     def __len__(self) -> int:
         return 1
 
-    def of_target(self, column: FloatArray) -> AnyArray:
+    def column_at_targets(self, column: FloatArray) -> AnyArray:
         return column[self.craft]
 
 
-def calibrated_signature(camera: Any, known: CameraCalibration) -> float:
+def signature_at_calibration_range(camera: Any, known: CameraCalibration) -> float:
     """Return the signature that the target of the calibration has at its range."""
     craft = known.aircraft
     if craft is None:  # a sphere shows the same to all sides
@@ -236,7 +236,7 @@ def calibrated_signature(camera: Any, known: CameraCalibration) -> float:
     return signature
 
 
-def farthest_detection_m(camera: Any, areas: str, contrast: str) -> float:
+def detection_range_bound_m(camera: Any, areas: str, contrast: str) -> float:
     """Return a range beyond which this camera detects nothing, m; infinite if unknown.
 
     The area shown is at most the sum of the bodies' areas and the contrast at most each target's

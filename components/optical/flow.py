@@ -32,7 +32,7 @@ _AROUND = np.ones((3, 3), np.uint8)
 
 
 @cache
-def opencv() -> Any:
+def single_threaded_opencv() -> Any:
     """Return OpenCV set to one thread; raise ImportError with the command to install it."""
     try:
         import cv2
@@ -65,7 +65,7 @@ def find_spot(picture: FloatArray, sought: BoolArray, spread_pixels: float, nois
     pixels is the vertex of a parabola, or of a spot larger than its filter, over which the filter
     has no peak but noise, the middle of what stands out with it.
     """
-    cv2 = opencv()
+    cv2 = single_threaded_opencv()
     rim = _rim_mask(picture.shape[0])
     behind = float(picture[rim].mean())
     flat = picture - behind
@@ -107,7 +107,9 @@ def _spot_centroid(
 
     It is weighed by the picture, as its edge covers pixels in part.
     """
-    _, labels = opencv().connectedComponents(stands.astype(np.uint8), connectivity=8)
+    _, labels = single_threaded_opencv().connectedComponents(
+        stands.astype(np.uint8), connectivity=8
+    )
     rows, columns = np.nonzero(labels == labels[row, column])
     weight = picture[rows, columns]
     x, y = (float(np.average(one + 0.5, weights=weight)) for one in (columns, rows))
@@ -123,7 +125,9 @@ def _filter_noise_gain(size: int, spread: float) -> float:
     """
     point = np.zeros((size, size))
     point[size // 2, size // 2] = 1.0
-    weight = opencv().GaussianBlur(point, (0, 0), spread, borderType=opencv().BORDER_REFLECT)
+    weight = single_threaded_opencv().GaussianBlur(
+        point, (0, 0), spread, borderType=single_threaded_opencv().BORDER_REFLECT
+    )
     rim = _rim_mask(size)
     weight -= rim / np.count_nonzero(rim)
     return float(np.sqrt((weight**2).sum()))
@@ -177,7 +181,7 @@ def spot_flow(
     mask = _spot_mask(later, spot, sought)
     if mask is None:
         return _NOTHING
-    ahead = _match_whole_pixels(earlier, later, spot, mask)
+    ahead = _whole_pixel_displacement(earlier, later, spot, mask)
     second = _pixel_coverage(later, mask, spot)
     flow = ahead.astype(np.float64)
     for _ in range(_ROUNDS):
@@ -187,7 +191,7 @@ def spot_flow(
         if before[-1].any() or before[:, -1].any():
             return _NOTHING
         first = _pixel_coverage(earlier, before, spot)
-        found = _register_shift(_shift_pixels(first, ahead), second, noise / spot.level)
+        found = _subpixel_displacement(_shift_pixels(first, ahead), second, noise / spot.level)
         flow = ahead + np.array(found[:2])
         whole = np.rint(flow)
         if not np.isfinite(whole).all() or np.abs(whole - ahead).max() > 2.0:
@@ -206,18 +210,18 @@ def spot_flow(
 
 def _spot_mask(later: FloatArray, spot: Spot, sought: BoolArray) -> Any:
     """Return a mask (0 or 1) of the spot's pixels and those beside them; None if not found."""
-    cv2, size = opencv(), later.shape[0]
+    cv2, size = single_threaded_opencv(), later.shape[0]
     stands = (sought & (later - spot.behind > 0.5 * spot.level)).astype(np.uint8)
     _, labels = cv2.connectedComponents(stands, connectivity=8)
     mine = labels[min(int(spot.y), size - 1), min(int(spot.x), size - 1)]
     return None if mine == 0 else cv2.dilate((labels == mine).astype(np.uint8), _AROUND)
 
 
-def _match_whole_pixels(
+def _whole_pixel_displacement(
     earlier: FloatArray, later: FloatArray, spot: Spot, mask: AnyArray
 ) -> AnyArray:
     """Return the spot's displacement (x, y) in whole pixels, by the pictures' best correlation."""
-    cv2 = opencv()
+    cv2 = single_threaded_opencv()
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     top, bottom, left, right = rows[0], rows[-1] + 1, columns[0], columns[-1] + 1
     first, second = ((one - spot.behind).astype(np.float32) for one in (earlier, later))
@@ -243,7 +247,7 @@ def _pixel_coverage(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArr
     A pixel is partly the target's and partly the background's: the background counts less the more
     is covered.
     """
-    cv2 = opencv()
+    cv2 = single_threaded_opencv()
     own = cv2.dilate(mask, _AROUND)
     behind: Any = np.full_like(picture, spot.behind)
     if spot.cluttered:
@@ -255,7 +259,7 @@ def _pixel_coverage(picture: FloatArray, mask: AnyArray, spot: Spot) -> FloatArr
 
 def _interpolate_background(picture: FloatArray, own: AnyArray, level: float) -> FloatArray:
     """Return the background, with the target's pixels filled smoothly from those beside them."""
-    cv2 = opencv()
+    cv2 = single_threaded_opencv()
     outside = 1.0 - own.astype(np.float64)
     weight = cv2.GaussianBlur(outside, (0, 0), _NEAR) + _LITTLE
     beside = cv2.GaussianBlur((picture - level) * outside, (0, 0), _NEAR) / weight
@@ -266,7 +270,7 @@ def _interpolate_background(picture: FloatArray, own: AnyArray, level: float) ->
     return filled + level
 
 
-def _register_shift(first: FloatArray, second: FloatArray, noise: float) -> Flow:
+def _subpixel_displacement(first: FloatArray, second: FloatArray, noise: float) -> Flow:
     """Return the second picture's sub-pixel shift and its standard deviation, pixels.
 
     The correlation is that of both, smoothed by `_SMOOTH`: the sharpest detail is not sampled

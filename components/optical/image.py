@@ -11,17 +11,17 @@ from pydantic import Field, model_validator
 from components.geometry import angle_between_vectors, body_to_ned, ned_to_body, unit_vector
 from components.geometry import body_angles as angles_of
 from components.messages.detections import EXTRAS, Detections
-from components.optical.flow import find_spot, opencv, spot_flow
+from components.optical.flow import find_spot, single_threaded_opencv, spot_flow
 from components.optical.picture import (
     Pinhole,
+    capsule_and_plate_outlines,
     grey_levels,
-    patch_angles,
-    target_outlines,
+    patch_azimuths_elevations,
     textured_background,
     union_coverage,
 )
 from components.optical.sensors import ElectroOptical, ElectroOpticalParameters
-from components.optical.silhouette import union_area
+from components.optical.silhouette import exact_area_of_bodies_union
 from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look, effect_values_of_cells
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
@@ -149,7 +149,7 @@ class ImageCamera(ElectroOptical):
 
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
-        opencv()
+        single_threaded_opencv()
         azimuth, elevation = self.reach.azimuth_rad, self.reach.elevation_rad
         width = self.pixel_azimuth_rad * parameters.azimuth_pixels
         self.pinhole = Pinhole(
@@ -170,8 +170,8 @@ class ImageCamera(ElectroOptical):
         fields = {name: np.full(count, np.nan) for name in PICTURE}
         confidence, pixels = np.full(count, -self.detector.threshold), np.zeros(count)
         if count:
-            now, before, there = self._views(cells)
-            outlines = self._outlines(cells, now)
+            now, before, there = self._views_now_and_before(cells)
+            outlines = self._capsule_and_plate_outlines(cells, now)
             contrast = self.contrast(cells)
             for factor in self._contrast_factors:
                 contrast = contrast * effect_values_of_cells(self, factor, cells)
@@ -189,11 +189,13 @@ class ImageCamera(ElectroOptical):
                     fields[name][cell] = value
         return Look(confidence >= 0.0, confidence, {"pixels": pixels, **fields}, {})
 
-    def _views(self, cells: Cells) -> tuple[_View, _View, Any]:
+    def _views_now_and_before(self, cells: Cells) -> tuple[_View, _View, Any]:
         """Return the cells' pixels now and one frame ago, and which targets were present (mask)."""
         now = self._view(cells.body_azimuth_rad, cells.body_elevation_rad, cells.own_attitude)
         count = len(cells)
-        seen = cells.seen_at(np.arange(count), np.full(count, -self.p.frame_interval_s))
+        seen = cells.relative_target_fields_ahead(
+            np.arange(count), np.full(count, -self.p.frame_interval_s)
+        )
         then = tuple(seen[f"own_{name}_rad"] for name in ("yaw", "pitch", "roll"))
         before = self._view(seen["body_azimuth_rad"], seen["body_elevation_rad"], then)
         return now, before, seen["present"]
@@ -201,13 +203,13 @@ class ImageCamera(ElectroOptical):
     def _view(self, azimuth: FloatArray, elevation: FloatArray, attitude: Any) -> _View:
         return _View(*self.pinhole.pixel(*self.axes(azimuth, elevation)), attitude)
 
-    def _outlines(self, cells: Cells, now: _View) -> list[FloatArray]:
+    def _capsule_and_plate_outlines(self, cells: Cells, now: _View) -> list[FloatArray]:
         """Return capsule and plate outlines, (cells, points, 2) each, pixels from the middle."""
         columns = (cells.roster.column(f"eo.{n}_m2") for n in ("front", "side", "horizontal"))
-        front, side, flat = (cells.of_target(column) for column in columns)
+        front, side, flat = (cells.column_at_targets(column) for column in columns)
         yaw = cells.relative_heading_rad + cells.azimuth_rad
         attitude = yaw, cells.target_pitch_rad, cells.target_roll_rad
-        drawn = target_outlines(
+        drawn = capsule_and_plate_outlines(
             cells.azimuth_rad, cells.elevation_rad, cells.range_m, attitude, (front, side, flat)
         )
         own = [angle[:, np.newaxis] for angle in now.attitude]
@@ -219,7 +221,7 @@ class ImageCamera(ElectroOptical):
         ahead = unit_vector(cells.azimuth_rad, cells.elevation_rad)
         middle = place(np.stack(ahead, axis=-1)[:, np.newaxis])
         # As large as the scene's model of the area says, in the shape of the bodies.
-        union = union_area(
+        union = exact_area_of_bodies_union(
             cells.relative_heading_rad, cells.target_pitch_rad, cells.target_roll_rad,
             cells.elevation_rad, front, side, flat, None,
         )  # fmt: skip
@@ -248,7 +250,9 @@ class ImageCamera(ElectroOptical):
         earlier = np.array([before.column[cell], before.row[cell]])
         moved = middle - earlier
         # So far it moves before what is behind it, which the earlier patch has to hold too.
-        beside = self._pixel_of(self._direction(middle, attitude), then) - earlier
+        beside = (
+            self._pixel_of_ned_vector(self._ned_vector_of_pixel(middle, attitude), then) - earlier
+        )
         there = there and bool(np.isfinite([moved, beside]).all())
         smear = moved * (self.p.exposure_s / self.p.frame_interval_s) if there else np.zeros(2)
         extent += 0.5 * float(np.hypot(*smear))
@@ -274,7 +278,7 @@ class ImageCamera(ElectroOptical):
         if answer["confidence"] < 0.0 or not there or spot.pixels < 3:
             return answer
         # The earlier patch is where the same part of the sky was, by the platform's own turn.
-        where = self._pixel_of(self._direction(place, attitude), then)
+        where = self._pixel_of_ned_vector(self._ned_vector_of_pixel(place, attitude), then)
         if not np.isfinite(where).all():
             return answer
         before_corner = np.floor(where / binned).astype(np.int64) - half
@@ -284,7 +288,10 @@ class ImageCamera(ElectroOptical):
         answer["flow_deviation_px"] = flow.deviation * binned
         answer["flow_column_px"], answer["flow_row_px"] = moved_px
         if np.isfinite(moved_px).all():
-            lines = self._direction(place, attitude), self._direction(place - moved_px, then)
+            lines = (
+                self._ned_vector_of_pixel(place, attitude),
+                self._ned_vector_of_pixel(place - moved_px, then),
+            )
             turn = float(angle_between_vectors(*lines))
             answer["flow_rate_rad_s"] = turn / self.p.frame_interval_s
         return answer
@@ -293,7 +300,7 @@ class ImageCamera(ElectroOptical):
     def pixel_noise(self) -> float:
         """Standard deviation of a pixel's noise, as a contrast."""
         return float(
-            self.detector.noise / (self._static_weight_or_one * math.sqrt(self.spot_pixels))
+            self.detector.noise / (self._static_weight_or_one * math.sqrt(self.point_spread_pixels))
         )
 
     def _render_patch(
@@ -309,7 +316,7 @@ class ImageCamera(ElectroOptical):
             [at + (2.0 / scene.binned) * outline for outline in scene.outlines],
             2 * side, 2 * side, 2.0 * scene.smear,
         )  # fmt: skip
-        spread, cv2 = 2.0 * self.p.blur_pixels / scene.binned, opencv()
+        spread, cv2 = 2.0 * self.p.blur_pixels / scene.binned, single_threaded_opencv()
         fine = cv2.GaussianBlur(fine, (0, 0), spread, borderType=cv2.BORDER_REPLICATE)
         covered = fine.reshape(side, 2, side, 2).mean(axis=(1, 3))
         picture = scene.contrast * covered
@@ -329,11 +336,11 @@ class ImageCamera(ElectroOptical):
         side = 2 * scene.half
         at = (corner + scene.half) * scene.binned
         ahead, right, down = (
-            self._pixel_to_ned(at + side * np.array(by), attitude)
+            self._ned_angles_of_pixel(at + side * np.array(by), attitude)
             for by in ((0, 0), (1, 0), (0, 1))
         )
         offset: Any = (np.arange(side) + 0.5 - scene.half) * (scene.binned / side)
-        azimuth, elevation = patch_angles(ahead, right, down, offset)
+        azimuth, elevation = patch_azimuths_elevations(ahead, right, down, offset)
         run = int(scene.cells.run[scene.cell])
 
         def normal(one: IntArray, other: IntArray) -> FloatArray:
@@ -343,17 +350,17 @@ class ImageCamera(ElectroOptical):
         grain = self.p.texture_pixels * self.pixel_azimuth_rad
         return textured_background(normal, azimuth, elevation, grain)
 
-    def _pixel_to_ned(self, pixel: AnyArray, attitude: Any) -> FloatArray:
-        x, y, z = self._direction(pixel, attitude)
+    def _ned_angles_of_pixel(self, pixel: AnyArray, attitude: Any) -> FloatArray:
+        x, y, z = self._ned_vector_of_pixel(pixel, attitude)
         return np.array([math.atan2(y, x), math.atan2(-z, math.hypot(x, y))])
 
-    def _direction(self, pixel: AnyArray, attitude: Any) -> FloatArray:
-        """Return the direction in NED of a place in the frame."""
+    def _ned_vector_of_pixel(self, pixel: AnyArray, attitude: Any) -> FloatArray:
+        """Return the unit vector (north, east, down) of what lies at a frame's (column, row)."""
         seen = self.axes.true_direction_in_body(*map(np.atleast_1d, self.pinhole.direction(*pixel)))
         return np.array(body_to_ned(*unit_vector(*seen), *attitude))[:, 0]
 
-    def _pixel_of(self, direction: FloatArray, attitude: Any) -> FloatArray:
-        """Return the place in the frame of a direction in NED."""
+    def _pixel_of_ned_vector(self, direction: FloatArray, attitude: Any) -> FloatArray:
+        """Return the frame's (column, row) at which a north-east-down vector lies."""
         body = ned_to_body(*(np.atleast_1d(one) for one in direction), *attitude)
         return np.array(self.pinhole.pixel(*self.axes(*angles_of(*body))))[:, 0]
 
@@ -376,7 +383,7 @@ class ImageCamera(ElectroOptical):
         elevation_rad = np.where(known, seen[1], elevation_rad)
         return super()._measure(cells, detected, look, azimuth_rad, elevation_rad, range_m)
 
-    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+    def _extra_columns(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return the picture columns recorded with each detection."""
         cued = {"cued": cells.is_cued()} if self._cue_cones else {}
         return {**look.extras, **cued}

@@ -15,7 +15,7 @@ from components.arguments.checks import (
     unflatten,
 )
 from components.optical.silhouette import line_of_sight_in_target_axes, visible_area
-from components.sensor.look import Cells, CellValues, aspect_angles_of_cells
+from components.sensor.look import Cells, CellValues, aspect_pitch_roll_elevation_rad
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 
@@ -124,7 +124,7 @@ class Plume(Effect[CellValues]):
         if not rosters:
             return Verdict(True, "plume is true and the targets are not known before the run")
         for roster in rosters:
-            for name, engine in zip(roster.names, roster.engines.tolist(), strict=True):
+            for name, engine in zip(roster.names, roster.propulsion_types.tolist(), strict=True):
                 if PLUME_SHARE_OF_BACK[engine] > 0.0:
                     return Verdict(True, f"plume is true and {name!r} has a {engine}")
         return Verdict(False, "plume is true, but no target's engine has one")
@@ -135,15 +135,15 @@ class Plume(Effect[CellValues]):
         shares = {engine: scale * share for engine, share in PLUME_SHARE_OF_BACK.items()}
 
         def added(cells: Cells) -> FloatArray:
-            engines = cells.of_target(cells.roster.engines)
-            back = cells.of_target(cells.roster.column("ir.back_m2"))
+            engines = cells.column_at_targets(cells.roster.propulsion_types)
+            back = cells.column_at_targets(cells.roster.column("ir.back_m2"))
             area = np.zeros(len(cells))
             for engine in np.unique(engines).tolist():
                 if PLUME_SHARE_OF_BACK[engine] == 0.0:
                     continue
                 chosen = np.flatnonzero(engines == engine)
                 area[chosen] = plume_area(
-                    *aspect_angles_of_cells(cells, chosen),
+                    *aspect_pitch_roll_elevation_rad(cells, chosen),
                     back_m2=back[chosen],
                     engine=engine,
                     plume_share_of_back=shares[engine],

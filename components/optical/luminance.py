@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     broadcast_flat,
     check_angle_rad,
+    check_finite,
     check_not_negative,
-    finite,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
@@ -118,16 +118,18 @@ def sky_luminance(
         sun_elevation_rad=check_daylight_sun(sun_elevation_rad),
     )
     from_sun = angle_between(azimuth, elevation, sun_azimuth, sun_elevation)
-    pattern = _pattern(np.sin(elevation), from_sun, sky)
+    pattern = _relative_luminance(np.sin(elevation), from_sun, sky)
     degrees = np.minimum(np.degrees(sun_elevation), 90.0)
     left = np.minimum(degrees.astype(np.int64), 89)
     share = degrees - left
-    scale = _pattern_illuminance(sky)
+    scale = _relative_illuminance_by_sun(sky)
     per_lux = scale[left] * (1.0 - share) + scale[left + 1] * share
     return unflatten(pattern * sky_illuminance(sun_elevation, sky) / per_lux, shape)
 
 
-def _pattern(sin_elevation: FloatArray, from_sun_rad: FloatArray, sky: str) -> FloatArray:
+def _relative_luminance(
+    sin_elevation: FloatArray, from_sun_rad: FloatArray, sky: str
+) -> FloatArray:
     """Return the relative luminance of the sky by the CIE formula, gradation times indicatrix."""
     a, b = SKIES[sky].gradation
     c, d, e = SKIES[sky].indicatrix
@@ -141,9 +143,9 @@ def _pattern(sin_elevation: FloatArray, from_sun_rad: FloatArray, sky: str) -> F
 
 
 @lru_cache(maxsize=len(SKIES))
-def _pattern_illuminance(sky: str) -> FloatArray:
-    """Return the unscaled sky's horizontal illuminance for the sun at 0, 1, ... 90 deg, (91,). 90
-    degrees.
+def _relative_illuminance_by_sun(sky: str) -> FloatArray:
+    """Return the unscaled sky's illuminance of level ground for the sun at 0 to 90 deg, (91,). 90
+    deg, (91,). 90 degrees.
     """
     nodes, weights = np.polynomial.legendre.leggauss(48)
     elevation = 0.25 * np.pi * (nodes + 1.0)
@@ -152,7 +154,7 @@ def _pattern_illuminance(sky: str) -> FloatArray:
     solid = np.outer(0.25 * np.pi * weights, 0.5 * np.pi * weights) * np.cos(el) * np.sin(el)
     sums = []
     for sun in np.radians(np.linspace(0.0, 90.0, 91)):
-        pattern = _pattern(np.sin(el), angle_between(az, el, 0.0, sun), sky)
+        pattern = _relative_luminance(np.sin(el), angle_between(az, el, 0.0, sun), sky)
         # Half the sky is integrated; the other half mirrors it.
         sums.append(2.0 * float((pattern * solid).sum()))
     table = np.array(sums)
@@ -166,7 +168,7 @@ BACKGROUNDS = ("sky", "ground", "auto")
 def inherent_contrast(target_cd_m2: ArrayLike, background_cd_m2: ArrayLike) -> Any:
     """Return the contrast at the target, |Lt - Lb| / Lb."""
     target = check_not_negative("target_cd_m2", target_cd_m2)
-    behind = positive("background_cd_m2", background_cd_m2)
+    behind = check_positive("background_cd_m2", background_cd_m2)
     return np.abs(target - behind) / behind
 
 
@@ -193,7 +195,7 @@ def target_luminance(
 
     Phase function of the Lambert sphere (classical, Lambert 1760), with the phase angle pi - χ.
     """
-    paint = finite("paint_reflectance", paint_reflectance)
+    paint = check_finite("paint_reflectance", paint_reflectance)
     refuse("paint_reflectance", paint, ~((paint >= 0.0) & (paint <= 1.0)), "be between 0 and 1")
     shape, (azimuth, elevation, sun_azimuth, sun_elevation, rho, ground) = broadcast_flat(
         azimuth_rad=check_angle_rad("azimuth_rad", azimuth_rad),
@@ -241,7 +243,7 @@ def background_luminance(
 
 
 def _check_ground_reflectance(ground_reflectance: ArrayLike) -> FloatArray:
-    ground = finite("ground_reflectance", ground_reflectance)
+    ground = check_finite("ground_reflectance", ground_reflectance)
     allowed = (ground > 0.0) & (ground <= 1.0)
     refuse("ground_reflectance", ground, ~allowed, "be above 0 and at most 1")
     return ground

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from components.aircraft.aspect_tables import SilhouetteTable
-from components.arguments.checks import finite
+from components.arguments.checks import check_finite
 from dsa_des.arrays.types import FloatArray
 from dsa_des.files.input_files import InputFileError, readable_file_status
 from dsa_des.text.safe_text import shorten
@@ -46,7 +46,7 @@ class TriangleMesh:
     is_convex: bool = field(init=False, default=False)
 
     def __post_init__(self) -> None:
-        vertices = finite("vertices_m", self.vertices_m)
+        vertices = check_finite("vertices_m", self.vertices_m)
         faces = np.asarray(self.faces)
         if vertices.ndim != 2 or vertices.shape[1] != 3:
             raise ValueError(f"vertices_m has shape {vertices.shape}: it must be (n, 3)")
@@ -85,20 +85,20 @@ class TriangleMesh:
         convex mesh of 1,500 triangles and 3-8 ms for another one: use `tabulate` before
         simulating.
         """
-        u = np.stack(np.broadcast_arrays(finite("u_x", u_x), u_y, u_z), axis=-1)
+        u = np.stack(np.broadcast_arrays(check_finite("u_x", u_x), u_y, u_z), axis=-1)
         shape = u.shape[:-1]
         corners = self.vertices_m[self.faces]
         crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # One direction at a time: its sum over triangles then has one order, whatever the shape.
         areas = [
-            _convex_silhouette(crosses, direction)
+            _convex_silhouette_area(crosses, direction)
             if self.is_convex
-            else _scan_silhouette(corners, direction, int(self.rows))
+            else _scanned_silhouette_area(corners, direction, int(self.rows))
             for direction in u.reshape(-1, 3)
         ]
         return np.array(areas, dtype=np.float64).reshape(shape)[()]
 
-    def tabulate(self, step_deg: float = 5.0) -> SilhouetteTable:
+    def build_silhouette_table(self, step_deg: float = 5.0) -> SilhouetteTable:
         """Build an aspect table of the silhouette, for use inside a simulation.
 
         The mesh's own error stays; bilinear interpolation adds to it, most where wings turn
@@ -180,15 +180,15 @@ def load_mesh(
         raise ValueError(f"{path}: {error}") from None
 
 
-def _convex_silhouette(crosses: FloatArray, direction: FloatArray) -> float:
+def _convex_silhouette_area(crosses: FloatArray, direction: FloatArray) -> float:
     facing = np.abs(
         crosses[:, 0] * direction[0] + crosses[:, 1] * direction[1] + crosses[:, 2] * direction[2]
     )
     return 0.25 * float(facing.sum())
 
 
-def _scan_silhouette(corners: FloatArray, direction: FloatArray, rows: int) -> float:
-    """Integrate the width of the union of projected triangles over `rows` scan lines."""
+def _scanned_silhouette_area(corners: FloatArray, direction: FloatArray, rows: int) -> float:
+    """Return the area of the union of projected triangles, summed over `rows` scan lines."""
     # Image axes: any two across the line of sight.
     helper = np.zeros(3)
     helper[int(np.argmin(np.abs(direction)))] = 1.0
@@ -234,7 +234,7 @@ def _scan_silhouette(corners: FloatArray, direction: FloatArray, rows: int) -> f
 
 
 def _edge_x(x: FloatArray, y: FloatArray, low: int, high: int, height: FloatArray) -> FloatArray:
-    """Find where the edge between two corners meets a height, kept between the corners."""
+    """Return x where the edge between two corners meets a height, kept between the corners."""
     rise = y[:, high] - y[:, low]
     share = (height - y[:, low]) / np.where(rise > 0.0, rise, 1.0)
     return x[:, low] + np.clip(share, 0.0, 1.0) * (x[:, high] - x[:, low])

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import finite
+from components.arguments.checks import check_finite
 from components.geometry import body_to_ned, unit_vector_unchecked
 from components.optical.silhouette import PLATE_ASPECT_RATIO
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -97,7 +97,7 @@ class Pinhole:
         )
 
     def direction(self, column: ArrayLike, row: ArrayLike) -> tuple[Any, Any]:
-        """Return azimuth and elevation in the sensor's axes of what is seen at a place."""
+        """Return azimuth and elevation (rad) in sensor axes of what is at picture positions."""
         focal_x, focal_y = self.focal_pixels
         across = (np.asarray(column) - self.middle_column) / focal_x
         upward = math.tan(self.elevation_rad[1]) - np.asarray(row) / focal_y
@@ -108,7 +108,7 @@ class Pinhole:
         return (column >= 0) & (column <= self.columns) & (row >= 0) & (row <= self.rows)
 
 
-def target_outlines(
+def capsule_and_plate_outlines(
     azimuth_rad: FloatArray,
     elevation_rad: FloatArray,
     range_m: FloatArray,
@@ -197,7 +197,7 @@ def polygon_pixel_shares(
     (Green's theorem, pixel by pixel). Corners, x to the right and y down in pixels, are those of
     any simple polygon, in either sense.
     """
-    corners = np.asarray(finite("corners", corners))
+    corners = np.asarray(check_finite("corners", corners))
     count, edges = corners.shape[:2]
     if edges < 3:
         return
@@ -223,7 +223,8 @@ def polygon_pixel_shares(
         mean = np.where(
             steep,
             np.clip(0.5 * (begin + end), 0.0, 1.0),
-            (_ramp(end) - _ramp(begin)) / np.where(steep, 1.0, wide),
+            (_clipped_ramp_integral(end) - _clipped_ramp_integral(begin))
+            / np.where(steep, 1.0, wide),
         )
         # Edges are summed up in their order, whatever their number in a row.
         hidden = np.zeros((len(corners[several]), width, height, edges))
@@ -236,7 +237,7 @@ def polygon_pixel_shares(
             yield box, share[: beyond - left, : below - above].T
 
 
-def _ramp(u: FloatArray) -> FloatArray:
+def _clipped_ramp_integral(u: FloatArray) -> FloatArray:
     """Return the integral from 0 to u of a line clipped to [0, 1]."""
     inner = np.clip(u, 0.0, 1.0)
     result: FloatArray = 0.5 * inner * inner + np.maximum(u - 1.0, 0.0)
@@ -277,7 +278,7 @@ def grey_levels(picture: FloatArray, most: int) -> Any:
     return grey[::step, ::step]
 
 
-def patch_angles(
+def patch_azimuths_elevations(
     middle: FloatArray, right: FloatArray, down: FloatArray, offset: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return a square patch's pixel azimuths and elevations, interpolated linearly, rad.

@@ -11,11 +11,11 @@ from components.optical.area_of_cells import area_of_cells
 from components.optical.camera import Camera, CameraParameters
 from components.optical.contrast import Background
 from components.optical.infrared_area import AREA, Plume
-from components.optical.silhouette import union_area
+from components.optical.silhouette import exact_area_of_bodies_union
 from components.optical.weather_effects import BandExtinction, Night
 from components.sensor.cued_looks import refuse_if_cued
 from components.sensor.ladder_values import over_cells
-from components.sensor.look import Cells, Look, aspect_angles_of_cells
+from components.sensor.look import Cells, Look, aspect_pitch_roll_elevation_rad
 from components.sensor.palette import EO, IR
 from components.sensor.parameters import CorrelationTime, ErrorParameters, SensorParameters
 from components.sensor.sensor import CUED_INPUTS, Sensor
@@ -72,10 +72,15 @@ def silhouette_truth_errors(block: Component, wake: Wake, cells: IntArray) -> di
         roster = cells.roster
         names = ["front_m2", "side_m2", "horizontal_m2"]
         names += ["back_m2"] if camera.areas == "ir" else []
-        bodies = [cells.of_target(roster.column(f"{camera.areas}.{name}")) for name in names]
-        wide = [array.astype(np.longdouble) for array in (*aspect_angles_of_cells(cells), *bodies)]
+        bodies = [
+            cells.column_at_targets(roster.column(f"{camera.areas}.{name}")) for name in names
+        ]
+        wide = [
+            array.astype(np.longdouble)
+            for array in (*aspect_pitch_roll_elevation_rad(cells), *bodies)
+        ]
         areas: Any = (*wide, None)[:8]
-        exact = union_area(*areas)
+        exact = exact_area_of_bodies_union(*areas)
         error = np.abs(camera.visible_area_m2(cells).astype(np.longdouble) - exact)
         return {_AREA.name: error.astype(np.float64)}
 
@@ -180,7 +185,7 @@ class ElectroOptical(Camera):
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return each target's own contrast gain, before background and weather."""
-        return cells.of_target(cells.roster.column("contrast"))
+        return cells.column_at_targets(cells.roster.column("contrast"))
 
 
 class InfraredParameters(CameraParameters):
@@ -213,7 +218,7 @@ class Infrared(Camera):
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return each target's contrast gain for IR."""
-        return cells.of_target(cells.roster.column("contrast_ir"))
+        return cells.column_at_targets(cells.roster.column("contrast_ir"))
 
 
 class ProjectionParameters(CameraParameters):
@@ -239,18 +244,18 @@ class Projection(Camera):
 
     @classmethod
     def ladders_for(cls, parameters: Any) -> tuple[Ladder, ...]:
-        """Return the ladder of the cameras of its band."""
+        """Return the ladder (models from crude to exact) of the cameras of its band."""
         return (INFRARED,) if parameters.band == "ir" else cls.ladders
 
     @property
-    def contrast_column(self) -> str:
+    def contrast_column_name(self) -> str:
         """Column of the roster that holds the contrast it sees, by its band."""
         return "contrast_ir" if self.p.band == "ir" else "contrast"
 
     def area(self, cells: Cells) -> FloatArray:
         """Return the area of the line: the target's length times one pixel's height there, m²."""
         band = self.p.band
-        length_m = cells.of_target(
+        length_m = cells.column_at_targets(
             fuselage_length_m(
                 cells.roster.column(f"{band}.front_m2"), cells.roster.column(f"{band}.side_m2")
             )
@@ -260,7 +265,7 @@ class Projection(Camera):
 
     def contrast(self, cells: Cells) -> FloatArray:
         """Return the colour contrast of each cell's target."""
-        return cells.of_target(cells.roster.column(self.contrast_column))
+        return cells.column_at_targets(cells.roster.column(self.contrast_column_name))
 
 
 def fuselage_length_m(front_m2: FloatArray, side_m2: FloatArray) -> FloatArray:

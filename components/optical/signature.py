@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from components.arguments.checks import (
     broadcast_flat,
     check_angle_rad,
+    check_finite,
     check_not_negative,
-    finite,
-    positive,
+    check_positive,
     unflatten,
 )
 from components.geometry import angle_between, wrap_by_sines
@@ -54,7 +54,7 @@ def line_of_sight_rate(
     previous_elevation = check_angle_rad(
         "previous_elevation_rad", np.where(seen, _floats(previous_elevation_rad), 0.0)
     )
-    interval = positive("interval_s", np.where(seen, _floats(interval_s), 1.0))
+    interval = check_positive("interval_s", np.where(seen, _floats(interval_s), 1.0))
     shape, (p, q, p_before, q_before, time, seen_flag) = broadcast_flat(
         azimuth_rad=azimuth,
         elevation_rad=elevation,
@@ -103,9 +103,9 @@ def pixels_covered(
     shape, (area, distance, across, upward, most) = broadcast_flat(
         area_m2=check_not_negative("area_m2", area_m2),
         range_m=check_not_negative("range_m", range_m),
-        pixel_azimuth_rad=positive("pixel_azimuth_rad", pixel_azimuth_rad),
-        pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
-        sensor_pixels=positive("sensor_pixels", sensor_pixels),
+        pixel_azimuth_rad=check_positive("pixel_azimuth_rad", pixel_azimuth_rad),
+        pixel_elevation_rad=check_positive("pixel_elevation_rad", pixel_elevation_rad),
+        sensor_pixels=check_positive("sensor_pixels", sensor_pixels),
     )
     return unflatten(pixels_of_cells(area, distance, across, upward, most), shape)
 
@@ -113,7 +113,7 @@ def pixels_covered(
 def pixels_of_cells(
     area: FloatArray, distance: FloatArray, across: Any, upward: Any, most: Any
 ) -> FloatArray:
-    """`pixels_covered` for flat arrays that were checked; the pixels may be plain numbers."""
+    """Return how many pixels each area covers, at most `most`, from flat, checked arrays."""
     distance = np.minimum(distance, _FARTHEST_M)
     pixel_m2 = (distance * across) * (distance * upward)
     fills = area >= pixel_m2 * most
@@ -171,7 +171,7 @@ def confidence(signature: ArrayLike, threshold: ArrayLike = 1.0) -> Any:
 
     The target is detected when C >= 0 (errata 10). C is in the units of E: weighted pixels.
     """
-    return finite("signature", signature) - finite("threshold", threshold)
+    return check_finite("signature", signature) - check_finite("threshold", threshold)
 
 
 def detection_range(
@@ -193,15 +193,17 @@ def detection_range(
 
     Thesis eq. 14, 15, 18 and 19 solved for R; errata 10 and 23.
     """
-    pixels = np.float64(1.0) if sensor_pixels is None else positive("sensor_pixels", sensor_pixels)
+    pixels = (
+        np.float64(1.0) if sensor_pixels is None else check_positive("sensor_pixels", sensor_pixels)
+    )
     shape, flat = broadcast_flat(
         area_m2=check_not_negative("area_m2", area_m2),
-        pixel_azimuth_rad=positive("pixel_azimuth_rad", pixel_azimuth_rad),
-        pixel_elevation_rad=positive("pixel_elevation_rad", pixel_elevation_rad),
+        pixel_azimuth_rad=check_positive("pixel_azimuth_rad", pixel_azimuth_rad),
+        pixel_elevation_rad=check_positive("pixel_elevation_rad", pixel_elevation_rad),
         contrast_gain=check_not_negative("contrast_gain", contrast_gain),
         static_weight=check_not_negative("static_weight", static_weight),
         dynamic_signature=check_not_negative("dynamic_signature", dynamic_signature),
-        threshold=finite("threshold", threshold),
+        threshold=check_finite("threshold", threshold),
         sensor_pixels=np.asarray(pixels),
     )
     area, across, upward, gain, weight, dynamic, level, most = flat

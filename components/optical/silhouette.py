@@ -72,7 +72,7 @@ def line_of_sight_in_target_axes(
     return u_x, u_y, u_z, np.sqrt(m * m + n * n)
 
 
-def front_and_back_area(
+def blend_front_and_back_area(
     cos_off_nose: FloatArray, front_m2: FloatArray, back_m2: FloatArray
 ) -> FloatArray:
     """Return the average of front and back area, weighted by the cosine of the angle off the nose
@@ -86,7 +86,7 @@ def front_and_back_area(
     return back_m2 * share_of_back + front_m2 * (1.0 - share_of_back)
 
 
-def exact_area(
+def exact_sum_of_body_areas(
     relative_heading_rad: FloatArray,
     pitch_rad: FloatArray,
     roll_rad: FloatArray,
@@ -104,7 +104,7 @@ def exact_area(
     u_x, _, u_z, sin_off_nose = line_of_sight_in_target_axes(
         relative_heading_rad, pitch_rad, roll_rad, elevation_rad
     )
-    sphere = front_m2 if back_m2 is None else front_and_back_area(u_x, front_m2, back_m2)
+    sphere = front_m2 if back_m2 is None else blend_front_and_back_area(u_x, front_m2, back_m2)
     return sphere + side_m2 * sin_off_nose + horizontal_m2 * np.abs(u_z)
 
 
@@ -118,7 +118,7 @@ _SMALLEST_PLATE_TILT = 1e-18
 _SMALLEST_ROUND_M2 = 1e-30
 
 
-def union_area(
+def exact_area_of_bodies_union(
     relative_heading_rad: FloatArray,
     pitch_rad: FloatArray,
     roll_rad: FloatArray,
@@ -149,7 +149,7 @@ def union_area(
     u_x, u_y, u_z, sin_off_nose = line_of_sight_in_target_axes(
         relative_heading_rad, pitch_rad, roll_rad, elevation_rad
     )
-    round_m2 = front_m2 if back_m2 is None else front_and_back_area(u_x, front_m2, back_m2)
+    round_m2 = front_m2 if back_m2 is None else blend_front_and_back_area(u_x, front_m2, back_m2)
     capsule_m2 = round_m2 + side_m2 * sin_off_nose
     plate_m2 = horizontal_m2 * np.abs(u_z)
     overlap_m2 = _overlap_area(
@@ -248,16 +248,16 @@ def thesis_area(
     shown = np.hypot(np.sin(theta_rad), np.cos(theta_rad) * np.sin(relative_heading_rad))
     sphere = front_m2
     if back_m2 is not None:
-        sphere = front_and_back_area(np.cos(relative_heading_rad), front_m2, back_m2)
+        sphere = blend_front_and_back_area(np.cos(relative_heading_rad), front_m2, back_m2)
     return sphere + side_m2 * shown + horizontal_m2 * np.abs(np.sin(phi_rad)) * shown
 
 
 MODELS = ("exact", "thesis", "aspect_table", "convex_hull")
 
 _PARAMETRIC: dict[str, Callable[..., FloatArray]] = {
-    "exact": exact_area,
+    "exact": exact_sum_of_body_areas,
     "thesis": thesis_area,
-    "convex_hull": union_area,
+    "convex_hull": exact_area_of_bodies_union,
 }
 
 

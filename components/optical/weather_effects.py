@@ -96,7 +96,7 @@ class BandExtinction(Effect[CellValues]):
         extinction = band_extinction_per_m(band, *haze_visibility_and_rain_extinction(weather))
 
         def factor(cells: Cells) -> FloatArray:
-            path = cells.range_m, cells.of_row("own_alt_m"), cells.alt_m
+            path = cells.range_m, cells.field_at_rows("own_alt_m"), cells.alt_m
             if band == "lwir":
                 clear = long_wave_transmission(*path, density)
             else:
@@ -134,7 +134,7 @@ class ObscuringCells(Effect[CellValues]):
                 rain = share_of_path_between(low, high, -math.inf, weather.rain_top_m)
                 fog = share_of_path_between(low, high, weather.fog_base_m, weather.fog_top_m)
                 per_m = rain * float(rain_extinction_per_m(one.rain_rate_mm_h))
-                per_m += fog * _fog_per_m(block, one.fog_water_g_m3)
+                per_m += fog * _fog_extinction_per_m(block, one.fog_water_g_m3)
                 depth += per_m * cells.range_m * (within.leaves - within.enters)
             with np.errstate(under="ignore"):
                 return np.exp(-depth)
@@ -142,7 +142,7 @@ class ObscuringCells(Effect[CellValues]):
         return factor
 
 
-def _fog_per_m(block: Any, water_g_m3: float) -> float:
+def _fog_extinction_per_m(block: Any, water_g_m3: float) -> float:
     """Return the extinction by fog of visible light, an infrared band or a laser, 1/m."""
     visibility_m = float(fog_visibility_m(water_g_m3))
     if math.isinf(visibility_m):
@@ -191,7 +191,7 @@ class Night(Effect[bool]):
         return Verdict(night, f"[weather] night is {str(night).lower()}")
 
     def build(self, block: Any) -> bool:
-        """Return that it is dark."""
+        """Return True, as it is dark."""
         return True
 
 

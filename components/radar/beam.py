@@ -14,10 +14,16 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import finite, positive
+from components.arguments.checks import check_finite, check_positive
 from components.geometry import TWO_PI, wrap_pi
 from components.messages.detections import REPORT, Detections, OwnOfEntries, ReportTransform
-from components.messages.reach import EVALUATE, FIELD_OF_VIEW, RANGE, Decision, farthest_look
+from components.messages.reach import (
+    EVALUATE,
+    FIELD_OF_VIEW,
+    RANGE,
+    Decision,
+    combined_farthest_look,
+)
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.sensor.look import Cells, CellValues
 from components.sensor.sensor import Sensor
@@ -49,17 +55,17 @@ def illumination_offset_s(
     The beam starts at `start_rad` and sweeps clockwise over `width_rad`, in (0, 2π], within the
     period; an azimuth outside counts as the nearer edge.
     """
-    positive("width_rad", width_rad)
+    check_positive("width_rad", width_rad)
     if not width_rad <= TWO_PI * (1.0 + 1e-12):
         raise ValueError(f"width_rad is {width_rad:g}: it must be at most 2π")
-    positive("scan_period_s", scan_period_s)
-    start = float(finite("start_rad", start_rad))
-    azimuth = np.asarray(finite("azimuth_rad", azimuth_rad))
+    check_positive("scan_period_s", scan_period_s)
+    start = float(check_finite("start_rad", start_rad))
+    azimuth = np.asarray(check_finite("azimuth_rad", azimuth_rad))
     swept = _clip_to_sweep(azimuth - start, width_rad)
     return np.minimum(swept / (width_rad / scan_period_s), scan_period_s)[()]
 
 
-def first_illumination(
+def first_lit_time_and_mask(
     azimuth_at: Callable[[FloatArray], FloatArray],
     azimuth_rad: FloatArray,
     *,
@@ -118,13 +124,13 @@ def first_illumination(
 
 
 def two_way_gain(off_axis_rad: FloatArray, beamwidth_rad: float) -> FloatArray:
-    """Return the gain of a Gaussian beam both ways over that on its axis: 1/4 at half its width."""
+    """Return a Gaussian beam's two-way gain relative to its axis: 1/4 at half its beamwidth."""
     share: FloatArray = np.exp(-8.0 * math.log(2.0) * (off_axis_rad / beamwidth_rad) ** 2)
     return share
 
 
 def angle_off_nearest_beam(angle_rad: FloatArray, width_rad: float, beams: int) -> FloatArray:
-    """Return how far an angle from the edge is off the nearest beam, where beams share a width."""
+    """Return the signed angle (rad) off the nearest of `beams` axes that share a width evenly."""
     step = width_rad / beams
     number = np.clip(np.floor(angle_rad / step), 0, beams - 1)
     return np.asarray(angle_rad - (number + 0.5) * step)
@@ -210,7 +216,7 @@ class Sweep:
         }
         self._ticks_per_s = block.context.ticks_per_s
 
-    def illuminate(
+    def targets_when_lit(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> LitTargets:
         """Return the targets at the instants at which the beam meets them, one row per scan.
@@ -238,7 +244,7 @@ class Sweep:
             return azimuth
 
         before, _ = block.axes(at_start.body_azimuth_rad, at_start.body_elevation_rad)
-        offset_s, met = first_illumination(azimuth_at, before, **self._turn)
+        offset_s, met = first_lit_time_and_mask(azimuth_at, before, **self._turn)
         if cued is not None and block.p.cued_beam_first:
             offset_s, met = np.where(cued, 0.0, offset_s), met | cued
         azimuth_at(offset_s)
@@ -259,7 +265,9 @@ class Sweep:
         """Add ``illuminated_s``, and the ownship's pose then, to what `lit` targets gave."""
         counts = np.diff(detections.offsets)
         # The radar knows when its beam pointed where it measured, whatever was there.
-        azimuth, _ = self._block.axes.from_body(detections.azimuth_rad, detections.elevation_rad)
+        azimuth, _ = self._block.axes.believed_direction_in_sensor(
+            detections.azimuth_rad, detections.elevation_rad
+        )
         offset_s = illumination_offset_s(azimuth, **self._turn)
         first = getattr(self._block.p, "cued_beam_first", False)
         if first and "cued" in detections.extras:
@@ -267,11 +275,11 @@ class Sweep:
         assert isinstance(targets, LitTargets)
         scan_s = np.repeat(detections.tick / self._ticks_per_s, counts)
         extras = {**detections.extras, "illuminated_s": scan_s + offset_s}
-        own = self._own_pose_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
+        own = self._believed_pose_when_lit(detections, targets, np.repeat(rows, counts), offset_s)
         after = np.rint(offset_s * self._ticks_per_s).astype(np.int64)
         return replace(detections, extras=extras, own_of_entries=own, ticks_after=after)
 
-    def _own_pose_when_lit(
+    def _believed_pose_when_lit(
         self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray
     ) -> dict[str, FloatArray] | None:
         """Return the believed pose at each detection's own instant by column, with the navigation
@@ -332,7 +340,7 @@ class SweepingSensor(Sensor):
         reach = super().request(port)
         if self._sweep is None or not self.p.enabled:
             return reach
-        return replace(farthest_look([reach]), lasts_s=self._sweep.period_s)
+        return replace(combined_farthest_look([reach]), lasts_s=self._sweep.period_s)
 
     def observed_targets_and_rows(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
@@ -342,4 +350,4 @@ class SweepingSensor(Sensor):
         """
         if self._sweep is None:
             return targets, rows
-        return self._sweep.illuminate(targets, rows, cued), np.arange(len(rows))
+        return self._sweep.targets_when_lit(targets, rows, cued), np.arange(len(rows))

@@ -31,15 +31,15 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
     check_numbers,
-    finite,
-    one_of,
-    positive,
+    check_one_of,
+    check_positive,
     refuse,
     unflatten,
 )
-from components.geometry import POSITION_FIELDS, north_east_up
+from components.geometry import POSITION_FIELDS, north_east_up_offsets_m
 from components.radar.ground_clutter import Echo, terrain_of
 from components.sensor.look import Cells
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -67,9 +67,9 @@ class MovingTargetFilter:
     notch_m_s: float | None = None
 
     def __post_init__(self) -> None:
-        one_of("kind", self.kind, FILTERS)
-        positive("prf_hz", self.prf_hz)
-        positive("wavelength_m", self.wavelength_m)
+        check_one_of("kind", self.kind, FILTERS)
+        check_positive("prf_hz", self.prf_hz)
+        check_positive("wavelength_m", self.wavelength_m)
         if self.notch_m_s is not None:
             check_not_negative("notch_m_s", self.notch_m_s)
         if not FEWEST_PULSES <= self.pulses <= MOST_PULSES:
@@ -79,7 +79,8 @@ class MovingTargetFilter:
         if self.kind == "filter_bank" and not len(self._usable_filter_centres):
             raise ValueError(
                 f"notch_m_s is {self.notch_m_s:g}: it leaves no filter of the {self.pulses} "
-                f"between the clutter and {self.unambiguous_m_s:g} m/s, the unambiguous velocity"
+                f"between the clutter and {self.unambiguous_range_rate_m_s:g} m/s, the "
+                f"unambiguous velocity"
             )
 
     @property
@@ -88,7 +89,7 @@ class MovingTargetFilter:
         return 0.5 * self.wavelength_m * self.prf_hz
 
     @property
-    def unambiguous_m_s(self) -> float:
+    def unambiguous_range_rate_m_s(self) -> float:
         """Largest unambiguous range rate, λ·PRF/4, m/s."""
         return 0.25 * self.wavelength_m * self.prf_hz
 
@@ -115,8 +116,8 @@ class MovingTargetFilter:
         lies, and `spread_m_s` is the standard deviation of the clutter's.
         """
         shape, (target, clutter, spread) = broadcast_flat(
-            target_m_s=finite("target_m_s", target_m_s),
-            clutter_m_s=finite("clutter_m_s", clutter_m_s),
+            target_m_s=check_finite("target_m_s", target_m_s),
+            clutter_m_s=check_finite("clutter_m_s", clutter_m_s),
             spread_m_s=check_not_negative("spread_m_s", spread_m_s),
         )
         # Cycles of the echo's phase from pulse to pulse.
@@ -246,7 +247,7 @@ def range_rate_and_own_velocity(
         there = [seen[f"own_{name}"] for name in POSITION_FIELDS]
         # From where it is at the first of the times: so near that the frame is the same.
         first = [np.tile(values[: len(values) // times], times) for values in there]
-        return (seen["range_m"], *north_east_up(*first, *there))
+        return (seen["range_m"], *north_east_up_offsets_m(*first, *there))
 
     rate, north, east, up = _rates_of_quantities(cells, np.arange(len(cells)), quantities)
     return rate, (north, east, -up)
@@ -265,7 +266,7 @@ def _rates_of_quantities(
             break
         each, times = detected[missing], len(points)
         ahead_s = np.repeat(np.array(points) * STEP_S, len(each))
-        seen = cells.seen_at(np.tile(each, times), ahead_s)
+        seen = cells.relative_target_fields_ahead(np.tile(each, times), ahead_s)
         for number, values in enumerate(quantities(seen, times)):
             if number == len(rates):
                 rates.append(np.full(len(detected), np.nan))
@@ -316,7 +317,7 @@ class DopplerProcessing:
         """Return the ownship's speed towards the ground in each target's range cell, m/s."""
         elevation_rad = cells.elevation_rad
         if self._terrain is not None:
-            height_m = cells.of_row("own_alt_m") - self._terrain.height_m
+            height_m = cells.field_at_rows("own_alt_m") - self._terrain.height_m
             sine = np.minimum(height_m / np.maximum(cells.range_m, 1.0), 1.0)
             elevation_rad = -np.arcsin(sine)
         level = np.cos(elevation_rad)

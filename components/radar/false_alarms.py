@@ -17,11 +17,11 @@ from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import BEAM_REACH_BEAMWIDTHS, Clutter, terrain_of
 from components.radar.measurement import FAINTEST
 from components.radar.rain import RainClutter
-from components.radar.resolution import cell_size, cells_of_radar
+from components.radar.resolution import cell_azimuth_elevation_range, cells_of_radar
 from components.sensor.cued_looks import CUE
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import ticks_to_nanoseconds
 
 MOST_PER_SCAN = 1e5
 
@@ -43,7 +43,7 @@ class NoiseReports:
         self._places = block.stream("false alarm places")
 
     @cached_property
-    def _crossings(self) -> list[Crossing]:
+    def _crossings_outside_and_in_cues(self) -> list[Crossing]:
         """Thresholds outside and, if they differ, inside cue cones; available after setup."""
         block = self._block
         cued = block.cued_crossing() if block.built(CUE) else None
@@ -52,7 +52,7 @@ class NoiseReports:
     def refuse_too_many(self) -> None:
         """Raise ValueError if noise crosses the threshold too often per scan."""
         block = self._block
-        for crossing in self._crossings:
+        for crossing in self._crossings_outside_and_in_cues:
             expected = self._cells.count * crossing.false_alarm_probability
             if expected > MOST_PER_SCAN:
                 raise ValueError(
@@ -66,7 +66,7 @@ class NoiseReports:
         self, detections: Detections, targets: RelativeTargets, rows: IntArray
     ) -> Detections:
         """Return the report with the false alarms of its scans."""
-        for which, crossing in enumerate(self._crossings):
+        for which, crossing in enumerate(self._crossings_outside_and_in_cues):
             detections = self._add_false_alarms(detections, targets, rows, crossing, which)
         return sort_by_measurement(detections)
 
@@ -78,7 +78,7 @@ class NoiseReports:
         crossing: Crossing,
         which: int,
     ) -> Detections:
-        now_ns = nanosecond_of(detections.tick, self._block.context.ticks_per_s)
+        now_ns = ticks_to_nanoseconds(detections.tick, self._block.context.ticks_per_s)
         counts = self._counts.of_runs(detections.run, now_ns)
         count = false_alarm_count(
             counts.uniform(_NO_TARGET, detections.scan, which),
@@ -106,7 +106,7 @@ class NoiseReports:
         )
         rate = places.uniform(key, scan, 4)
         snr = np.maximum(snr, FAINTEST)
-        cued = bool(which) if len(self._crossings) > 1 else None
+        cued = bool(which) if len(self._crossings_outside_and_in_cues) > 1 else None
         return self._block.add_noise_reports(
             detections, targets, rows, row, where, key=key, snr=snr, rate=rate, cued=cued
         )
@@ -156,7 +156,7 @@ class _CellsWithoutTarget:
     def __len__(self) -> int:
         return len(self.range_m)
 
-    def of_row(self, name: str) -> AnyArray:
+    def field_at_rows(self, name: str) -> AnyArray:
         """Return the ownship's altitude for each cell, m; no other name is known."""
         assert name == "own_alt_m"
         return np.full(len(self), self._own_alt_m)
@@ -168,7 +168,7 @@ class GroundReports:
     def __init__(self, block: Any) -> None:
         self._block, self._terrain = block, terrain_of(block)
         self._cells = cells = cells_of_radar(block)
-        _, self._elevation_beamwidth_rad, _ = cell_size(block.p)
+        _, self._elevation_beamwidth_rad, _ = cell_azimuth_elevation_range(block.p)
         self._draws = block.stream("clutter false alarms")
         axes = (
             (cells.azimuth_rad, cells.azimuth),
@@ -188,12 +188,12 @@ class GroundReports:
 
     @cached_property
     def _crossing(self) -> Crossing:
-        """The threshold; known after setup."""
+        """Threshold of the radar, with its false alarm probability; known after setup."""
         crossing: Crossing = self._block.crossing
         return crossing
 
     @cached_property
-    def _body(self) -> Vector:
+    def _beam_vectors_in_body_axes(self) -> Vector:
         """Unit vectors along the true directions of all beams in body axes."""
         x, y, z = unit_vector(*self._block.axes.true_direction_in_body(*self._beams))
         return x, y, z
@@ -242,10 +242,12 @@ class GroundReports:
         turned = [
             float(targets.own_attitude[f"{name}_rad"][row]) for name in ("yaw", "pitch", "roll")
         ]
-        elevation_rad = -np.arcsin(np.clip(body_to_ned(*self._body, *turned)[2], -1.0, 1.0))
+        elevation_rad = -np.arcsin(
+            np.clip(body_to_ned(*self._beam_vectors_in_body_axes, *turned)[2], -1.0, 1.0)
+        )
         parts = [
             (depth + beam * self._cells.range, *self._clutter_pfa_and_cnr(own_alt_m, depth, away))
-            for depth, beam, away in self._lit_cells(own_alt_m, elevation_rad)
+            for depth, beam, away in self._range_cells_with_beams(own_alt_m, elevation_rad)
         ]
         if not parts:
             return np.empty(0, dtype=np.int64), np.empty(0)
@@ -263,7 +265,7 @@ class GroundReports:
         crossing = np.flatnonzero(draw < extra)
         return cell[crossing], cnr[crossing]
 
-    def _lit_cells(
+    def _range_cells_with_beams(
         self, own_alt_m: float, elevation_rad: FloatArray
     ) -> Iterator[tuple[int, IntArray, FloatArray]]:
         """Yield each clutter range cell's index, its beams' indices and elevations (rad)."""

@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
     check_numbers,
-    finite,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
-from components.radar.resolution import cell_size
+from components.radar.resolution import cell_azimuth_elevation_range
 from components.sensor.look import Cells
 from components.terrain.reflection import reflection_coefficient
 from dsa_des.arrays.types import FloatArray
@@ -34,8 +34,8 @@ _LN_2 = math.log(2.0)
 def height_above_terrain_m(own_alt_m: ArrayLike, terrain_alt_m: ArrayLike) -> Any:
     """Return the height above terrain, m; raise ValueError if it is not above 0."""
     shape, (own, terrain) = broadcast_flat(
-        own_alt_m=finite("own_alt_m", own_alt_m),
-        terrain_alt_m=finite("terrain_alt_m", terrain_alt_m),
+        own_alt_m=check_finite("own_alt_m", own_alt_m),
+        terrain_alt_m=check_finite("terrain_alt_m", terrain_alt_m),
     )
     buried = terrain >= own
     if buried.any():
@@ -76,13 +76,13 @@ def ground_clutter_rcs_m2(
         ("elevation_beamwidth_rad", elevation_beamwidth_rad),
         ("range_resolution_m", range_resolution_m),
     ):
-        positive(name, value)
+        check_positive(name, value)
     reflectivity = check_numbers("gamma_db", gamma_db)
     refuse("gamma_db", reflectivity, ~(np.abs(reflectivity) <= 100.0), "lie in ±100 dB")
     shape, (distance, elevation, height) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        elevation_rad=finite("elevation_rad", elevation_rad),
-        height_m=positive("height_m", height_m),
+        elevation_rad=check_finite("elevation_rad", elevation_rad),
+        height_m=check_positive("height_m", height_m),
     )
     sine = np.minimum(height, distance) / _distance_or_height(distance, height)
     grazing = np.arcsin(sine)
@@ -108,9 +108,10 @@ def ground_ring_rcs_m2(
     σ0 2 pi R ΔR, before any gain: on flat ground the ring at slant range R has that area whatever
     the height. 0 nearer than the height.
     """
-    positive("range_resolution_m", range_resolution_m)
+    check_positive("range_resolution_m", range_resolution_m)
     shape, (distance, height) = broadcast_flat(
-        range_m=check_not_negative("range_m", range_m), height_m=positive("height_m", height_m)
+        range_m=check_not_negative("range_m", range_m),
+        height_m=check_positive("height_m", height_m),
     )
     sine = np.minimum(height, distance) / _distance_or_height(distance, height)
     area = 2.0 * math.pi * distance * range_resolution_m
@@ -136,9 +137,10 @@ def altitude_line_rcs_m2(
     edges; over all of it pi h² ρ², the RCS of a mirror below whatever its roughness.
     """
     shape, (distance, height) = broadcast_flat(
-        range_m=check_not_negative("range_m", range_m), height_m=positive("height_m", height_m)
+        range_m=check_not_negative("range_m", range_m),
+        height_m=check_positive("height_m", height_m),
     )
-    half_m = 0.5 * float(positive("range_resolution_m", range_resolution_m))
+    half_m = 0.5 * float(check_positive("range_resolution_m", range_resolution_m))
     slope_m = height * math.tan(slope_rad)
     edges = (np.maximum(distance + side * half_m, height) for side in (-1.0, 1.0))
     near, far = ((edge - height) * (edge + height) / slope_m**2 for edge in edges)
@@ -169,7 +171,7 @@ class Clutter:
     def sum_echoes(
         cls, echoes: Sequence[Echo], powers: Iterable[FloatArray], cells: int
     ) -> Clutter:
-        """Return the clutter of echoes with these powers over noise."""
+        """Return the sums of the echoes' powers over noise, diffuse ones apart from others."""
         mean, diffuse = np.zeros(cells), np.zeros(cells)
         for echo, power in zip(echoes, powers, strict=True):
             if echo.diffuse:
@@ -184,7 +186,7 @@ class Clutter:
         return self.mean + self.diffuse
 
     def take(self, cells: Any) -> Clutter:
-        """Return that of some cells."""
+        """Return the clutter of the selected cells."""
         return Clutter(self.mean[cells], self.diffuse[cells])
 
 
@@ -197,7 +199,7 @@ class Echo:
     def __init__(self, block: Any) -> None:
         self.block = block
         self.terrain = terrain_of(block)
-        *self.beam_rad, self.depth_m = cell_size(block.p)
+        *self.beam_rad, self.depth_m = cell_azimuth_elevation_range(block.p)
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return the RCS in each cell's resolution cell, m²."""
@@ -225,7 +227,7 @@ def scene_altitude_line_rcs_m2(block: Any, range_m: FloatArray, height_m: FloatA
     rcs = altitude_line_rcs_m2(
         range_m,
         height_m,
-        range_resolution_m=cell_size(block.p)[2],
+        range_resolution_m=cell_azimuth_elevation_range(block.p)[2],
         slope_rad=math.radians(terrain.facet_slope_deg),
         reflectivity=abs(down) ** 2,
     )
@@ -243,7 +245,7 @@ class GroundEcho(Echo):
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return the RCS of the ground in each cell's resolution cell, m²."""
-        height_m = height_above_terrain_m(cells.of_row("own_alt_m"), self.terrain.height_m)
+        height_m = height_above_terrain_m(cells.field_at_rows("own_alt_m"), self.terrain.height_m)
         rcs = ground_clutter_rcs_m2(
             cells.range_m,
             cells.elevation_rad,
@@ -260,7 +262,7 @@ class GroundEcho(Echo):
     ) -> tuple[FloatArray, FloatArray]:
         """Return cells' ground range rate, and its spread by beamwidth and ground motion, m/s."""
         speed_m_s = np.sqrt(sum(part * part for part in own_m_s))
-        platform = platform_spread_m_s(speed_m_s, ground_m_s, self.beam_rad[0])
+        platform = platform_range_rate_spread_m_s(speed_m_s, ground_m_s, self.beam_rad[0])
         return ground_m_s, np.hypot(self.terrain.clutter_motion_m_s, platform)
 
 
@@ -298,8 +300,10 @@ class GroundClutter(Effect[Echo]):
         terrain = terrain_of(block)
         if terrain is None:
             return Verdict(False, "[terrain] height_m is not given")
-        if block.boundary and block.p.sizeless_steps:
-            return Verdict(False, f"{block.p.sizeless_steps[0]} is 0: no cell, no ground in it")
+        if block.boundary and block.p.zero_steps_without_beamwidth:
+            return Verdict(
+                False, f"{block.p.zero_steps_without_beamwidth[0]} is 0: no cell, no ground in it"
+            )
         return Verdict(True, f"[terrain] height_m is {terrain.height_m:g}")
 
     def build(self, block: Any) -> Echo:
@@ -307,9 +311,10 @@ class GroundClutter(Effect[Echo]):
         terrain = terrain_of(block)
         if not self.verdict(block).simulated:
             return NoEcho(block)
-        if block.p.sizeless_steps:
+        if block.p.zero_steps_without_beamwidth:
             raise ValueError(
-                f"{block.p.sizeless_steps[0]} is 0: ground clutter fills a resolution cell, it "
+                f"{block.p.zero_steps_without_beamwidth[0]} is 0: ground clutter fills a "
+                f"resolution cell, it "
                 "must be above 0"
             )
         if block.p.pulses_summed > 1:
@@ -341,7 +346,7 @@ def terrain_of(block: Any) -> Any:
 _BEAM_DEVIATION = 1.0 / math.sqrt(16.0 * math.log(2.0))
 
 
-def platform_spread_m_s(
+def platform_range_rate_spread_m_s(
     speed_m_s: ArrayLike, ground_rate_m_s: ArrayLike, beamwidth_rad: float
 ) -> Any:
     """Return the standard deviation of the ground's range rates over a moving radar's beam, m/s.
@@ -351,10 +356,10 @@ def platform_spread_m_s(
     beamwidth / λ abeam: a Gaussian beam, seen twice, has the standard deviation beamwidth / sqrt(16
     ln 2). Straight ahead the spread is of second order in the beamwidth and left out.
     """
-    positive("beamwidth_rad", beamwidth_rad)
+    check_positive("beamwidth_rad", beamwidth_rad)
     shape, (speed, rate) = broadcast_flat(
         speed_m_s=check_not_negative("speed_m_s", speed_m_s),
-        ground_rate_m_s=finite("ground_rate_m_s", ground_rate_m_s),
+        ground_rate_m_s=check_finite("ground_rate_m_s", ground_rate_m_s),
     )
     across = np.sqrt(np.maximum((speed - rate) * (speed + rate), 0.0))
     return unflatten(_BEAM_DEVIATION * float(beamwidth_rad) * across, shape)

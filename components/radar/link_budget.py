@@ -14,9 +14,9 @@ from components.aircraft.aspect_tables import dbsm_to_m2
 from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
+    check_finite,
     check_not_negative,
-    finite,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
@@ -33,7 +33,7 @@ SMALLEST_MINIMUM_RANGE_M = 1e-3
 
 def wavelength(frequency_hz: ArrayLike) -> Any:
     """Return the wavelength in metres of a frequency in hertz."""
-    return SPEED_OF_LIGHT_M_S / positive("frequency_hz", frequency_hz)[()]
+    return SPEED_OF_LIGHT_M_S / check_positive("frequency_hz", frequency_hz)[()]
 
 
 @dataclass(frozen=True)
@@ -63,12 +63,12 @@ class LinkBudget:
                 "exactly one of them must be given"
             )
         if self.frequency_hz is not None:
-            positive("frequency_hz", self.frequency_hz)
+            check_positive("frequency_hz", self.frequency_hz)
         if self.minimum_range_m is not None:
-            nearest = float(positive("minimum_range_m", self.minimum_range_m))
+            nearest = float(check_positive("minimum_range_m", self.minimum_range_m))
             if nearest < SMALLEST_MINIMUM_RANGE_M:
                 raise ValueError(f"minimum_range_m is {nearest:g}: it must be at least 0.001")
-        positive("constant_m2", self.snr_constant_m2)
+        check_positive("constant_m2", self.snr_constant_m2)
 
     @property
     def wavelength(self) -> float:
@@ -87,11 +87,11 @@ class LinkBudget:
         be counted again as `pulses`.
         """
         wavelength_m = self.wavelength
-        positive("power_w", self.power_w)
-        positive("wavelength_m", wavelength_m)
-        positive("bandwidth_hz", self.bandwidth_hz)
+        check_positive("power_w", self.power_w)
+        check_positive("wavelength_m", wavelength_m)
+        check_positive("bandwidth_hz", self.bandwidth_hz)
         for name in ("antenna_gain_db", "integration_gain_db", "noise_figure_db", "losses_db"):
-            value = float(finite(name, getattr(self, name)))
+            value = float(check_finite(name, getattr(self, name)))
             if not abs(value) <= LARGEST_DB:
                 raise ValueError(f"{name} is {value:g}: it must lie in ±{LARGEST_DB:g} dB")
         gain_db = 2.0 * self.antenna_gain_db + self.integration_gain_db
@@ -143,7 +143,7 @@ class LinkBudget:
         The equation alone: where the result is below `nearest_m`, the radar processes no echo.
         """
         shape, (ratio, rcs) = broadcast_flat(
-            snr=positive("snr", snr), rcs_m2=check_not_negative("rcs_m2", rcs_m2)
+            snr=check_positive("snr", snr), rcs_m2=check_not_negative("rcs_m2", rcs_m2)
         )
         with np.errstate(under="ignore", over="ignore"):  # ends of the number range
             fourth = self.snr_constant_m2 * rcs / ratio
@@ -165,7 +165,7 @@ def calibrated_bandwidth(
     The thesis gives no bandwidth; it follows from one known detection range, as SNR times bandwidth
     is a constant. The budget's own bandwidth does not matter; `with_bandwidth` puts the result in.
     """
-    range_m = float(positive("range_km", range_km)) * 1000.0
+    range_m = float(check_positive("range_km", range_km)) * 1000.0
     if range_m < budget.nearest_m:
         raise ValueError(
             f"range_km is {range_km:g}: it must be at least the budget's minimum range, "
@@ -192,7 +192,7 @@ def detection_range(
     model: str = "swerling1",
 ) -> Any:
     """Return the slant range in metres at which a target of given RCS has Pd `pd`."""
-    rcs = positive("rcs_m2", rcs_m2)
+    rcs = check_positive("rcs_m2", rcs_m2)
     needed = required_snr(
         pd, pulses=pulses, false_alarm_probability=false_alarm_probability, model=model
     )

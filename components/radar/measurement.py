@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from components.arguments.checks import check_not_negative, positive
+from components.arguments.checks import check_not_negative, check_positive
 from components.geometry import NEAR_A_POLE_DEG, rotate_to_meridian
 from components.messages.columns import OWN_VELOCITY
 from components.messages.detections import REPORT, Detections, ReportTransform
-from components.messages.targets import RelativeTargets, own_velocity
-from components.radar.detection.detector_output import measured_snr
+from components.messages.targets import RelativeTargets, own_velocity_ned_m_s
+from components.radar.detection.detector_output import measured_snr_given_detection
 from components.radar.link_budget import wavelength
 from components.sensor.look import STRENGTH, Cells, Look, Strengthening
 from dsa_des.arrays.types import FloatArray, IntArray
@@ -40,7 +40,7 @@ def angle_variance(
     fundamental" and "accuracy of sequential lobing, fundamental"; Curry, Radar System Performance
     Modeling, 2nd ed., Artech House 2005, section 8.2, has the former.
     """
-    width = float(positive("beamwidth_rad", beamwidth_rad))
+    width = float(check_positive("beamwidth_rad", beamwidth_rad))
     ratio = _checked_energy_ratio(energy_ratio)
     if method == "monopulse":
         return _limited_variance(width, ratio, MONOPULSE_SLOPE)
@@ -58,7 +58,7 @@ def range_variance(range_resolution_m: float, energy_ratio: FloatArray) -> Float
     sqrt(3) / pi, which a receiver with weighting does not reach.
     """
     return _limited_variance(
-        float(positive("range_resolution_m", range_resolution_m)),
+        float(check_positive("range_resolution_m", range_resolution_m)),
         _checked_energy_ratio(energy_ratio),
     )
 
@@ -69,7 +69,7 @@ def range_rate_variance(range_rate_resolution_m_s: float, energy_ratio: FloatArr
     sigma = resolution / sqrt(2 n S/N), resolution = wavelength / (2 coherent time): Curry, section
     8.3.
     """
-    step = float(positive("range_rate_resolution_m_s", range_rate_resolution_m_s))
+    step = float(check_positive("range_rate_resolution_m_s", range_rate_resolution_m_s))
     return _limited_variance(step, _checked_energy_ratio(energy_ratio))
 
 
@@ -84,8 +84,8 @@ def _limited_variance(width: float, ratio: FloatArray, slope: float = 1.0) -> Fl
     return variance
 
 
-def signal_over_clutter(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
-    """Return the ratio of signal to noise and clutter, for measurement errors, as key `snr`.
+def signal_over_noise_and_clutter(snr: FloatArray, cnr: FloatArray | None) -> dict[str, FloatArray]:
+    """Return SNR / (1 + CNR), or the SNR without clutter, under the key `snr`.
 
     It is the SNR that the decision rested on and that is recorded: the mean one of a fluctuating
     target, or that of its sampled cross-section. A radar knows it from the height of the echo, to
@@ -179,12 +179,12 @@ class Strength:
                 over_noise = 10.0 ** (0.1 * extras["snr_db"][detected]) / mean
             floor = np.where(mean > 0.0, over_noise, floor)
         snr = np.empty(len(detected))
-        for crossing, part in block.crossings_of(cells, detected):
-            for model, chosen in block.models_in_use(cells):
+        for crossing, part in block.crossings_with_positions(cells, detected):
+            for model, chosen in block.swerling_models_and_cells(cells):
                 some = part
                 if not isinstance(chosen, slice):  # else one model for all
                     some = part[_positions_of_chosen(detected[part], chosen, len(cells))]
-                output = 1.0 + measured_snr(
+                output = 1.0 + measured_snr_given_detection(
                     tail[some],
                     mean[some],
                     threshold=crossing.threshold / floor[some],
@@ -194,7 +194,7 @@ class Strength:
                 snr[some] = np.maximum(output * floor[some] - 1.0, 0.0)
         snr_db, confidence = extras["snr_db"].copy(), look.confidence.copy()
         snr_db[detected] = 10.0 * np.log10(np.maximum(snr, FAINTEST))
-        confidence[detected] = snr_db[detected] - block.false_alarm_zero_db()
+        confidence[detected] = snr_db[detected] - block.confidence_zero_snr_db()
         signal: FloatArray = look.signal["snr"].copy()
         signal[detected] = snr
         return replace(
@@ -267,7 +267,7 @@ class OwnVelocity(Effect[ReportTransform]):
             state = targets.position_ticks[row]
             time_s = (state if after is None else state + after) / ticks_per_s
             velocity = _rotate_to_believed_north(
-                own_velocity(targets, row, time_s), targets, row, time_s
+                own_velocity_ned_m_s(targets, row, time_s), targets, row, time_s
             )
             if after is not None:
                 own = dict(zip(OWN_VELOCITY, velocity, strict=True))

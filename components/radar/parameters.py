@@ -24,7 +24,7 @@ from dsa_des.block.component import Parameters
 from dsa_des.errors import Disagreements
 
 
-def cued_snr_factor(parameters: Any) -> Any:
+def cued_snr_factor_function(parameters: Any) -> Any:
     """Return a function giving cells' SNR factor: the cued dwell factor in cue cones, else 1."""
 
     def factor(cells: Any) -> Any:
@@ -148,7 +148,7 @@ class RadarParameters(ResolutionParameters):
         return said
 
     @model_validator(mode="after")
-    def _rate_is_measured(self) -> Self:
+    def _check_range_rate_keys(self) -> Self:
         Disagreements.raise_if_any(
             f"{key} is {getattr(self, key):g} and measures_range_rate is false: set it to true, "
             f"or leave {key} out"
@@ -158,7 +158,7 @@ class RadarParameters(ResolutionParameters):
         return self
 
     @model_validator(mode="after")
-    def _one_threshold(self) -> Self:
+    def _check_cfar_or_noise_threshold(self) -> Self:
         if self.cfar_reference_cells is not None and self.clutter_threshold == "noise":
             raise ValueError(
                 f"cfar_reference_cells is {self.cfar_reference_cells} and clutter_threshold is "
@@ -167,7 +167,7 @@ class RadarParameters(ResolutionParameters):
         return self
 
     @model_validator(mode="after")
-    def _filter(self) -> Self:
+    def _check_doppler_filter_keys(self) -> Self:
         kind = self.moving_target_filter
         if self.range_rate_folds:
             for key in ("measures_range_rate", "prf_hz"):
@@ -300,7 +300,7 @@ class LinkBudgetParameters(GlintParameters, RadarParameters, TimeBudgetParameter
         return said
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
+    def _check_link_budget_is_complete(self) -> Self:
         if (self.wavelength_m is None) == (self.frequency_hz is None):
             raise ValueError("exactly one of wavelength_m and frequency_hz must be given")
         if self.calibrate is None:

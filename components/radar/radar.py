@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from components.geometry import body_to_ned, unit_vector
-from components.messages.targets import RelativeTargets, own_velocity
+from components.messages.targets import RelativeTargets, own_velocity_ned_m_s
 from components.radar.beam import BeamSweep, SweepingSensor
 from components.radar.detection.cfar import REFERENCE_CELLS, Averaging, CellAveraging
 from components.radar.detection.ladder import DETECTION
@@ -42,10 +42,15 @@ from components.radar.weather import (
     SNR,
     WEATHER_EFFECTS,
     BlindRange,
-    rain_warnings,
+    rain_echo_warnings,
     weather_without_carrier_warnings,
 )
-from components.sensor.acquisition import STEP_S, Acquired, AcquisitionRange, check_speeds_ascend
+from components.sensor.acquisition import (
+    STEP_S,
+    Acquired,
+    AcquisitionRange,
+    check_ranges_cover_all_speeds,
+)
 from components.sensor.cued_looks import refuse_if_cued
 from components.sensor.look import Cells, CellValues, Look, effect_values_of_cells
 from components.sensor.palette import RADAR
@@ -98,19 +103,19 @@ class Radar(SweepingSensor):
         self.cfar = self.built_one(REFERENCE_CELLS)
         self._merging = self.built_one(ONE_REPORT)
 
-    def resolve_echoes(self, cells: Cells, power: FloatArray) -> FloatArray:
-        """Return each cell's echo power in its resolution cell; 0 if merged into another."""
+    def merge_echoes_by_cell(self, cells: Cells, power: FloatArray) -> FloatArray:
+        """Return echo powers; where targets merge, the strongest has the sum, the others 0."""
         return power if self._merging is None else self._merging(cells, power)
 
     def apparent_range_m(self, range_m: FloatArray) -> FloatArray:
-        """Return the ranges, m, attributed to echoes from given ranges; different if they fold."""
+        """Return the range (m) the radar takes each range for; the same unless ranges fold."""
         seeming: Any = self.built_one(SEEMING_RANGE)
         return range_m if seeming is None else np.asarray(seeming(np.asarray(range_m)))
 
     def filter_echoes(
         self, cells: Cells, signal: FloatArray, beside: list[FloatArray]
     ) -> tuple[FloatArray, list[FloatArray]]:
-        """Return powers of targets and of the echoes behind the filter, where there is one."""
+        """Return target and other echo powers after the Doppler filter; unchanged without one."""
         if self.doppler is None:
             return signal, beside
         passed, residues = self.doppler(cells, self.echoes)
@@ -131,7 +136,7 @@ class Radar(SweepingSensor):
             ambiguous_m=getattr(self.p, "farthest_report_m", math.inf),
         )
 
-    def exact_because(self) -> str:
+    def why_exact_line_of_sight(self) -> str:
         """Return why an exact line of sight is needed (range rates), else an empty string."""
         return f"{self.name} measures range rates" if self._rates else ""
 
@@ -140,10 +145,10 @@ class Radar(SweepingSensor):
         return self.built_one(RANGE_RATE)
 
     @property
-    def steps(self) -> dict[str, float]:
+    def grid_step_by_quantity(self) -> dict[str, float]:
         """Grid step of each quantity that is measured: rad, m and m/s."""
         rate = {"range_rate": self.p.range_rate_resolution_m_s}
-        return super().steps | (rate if self.p.measures_range_rate else {})
+        return super().grid_step_by_quantity | (rate if self.p.measures_range_rate else {})
 
     def range_rate(self, cells: Cells, detected: IntArray) -> FloatArray | None:
         """Return the true range rates of some cells, m/s; None where they are not measured."""
@@ -163,7 +168,7 @@ class Radar(SweepingSensor):
             beside = {**beside, "range_rate_m_s": folded}
         return azimuth, elevation, range_m, beside
 
-    def noise_range_rate(
+    def random_range_rates_m_s(
         self,
         uniform: FloatArray,
         where: Mapping[str, FloatArray],
@@ -182,7 +187,7 @@ class Radar(SweepingSensor):
             return off * 0.25 * self.wavelength_m * self.p.prf_hz
         each, index = np.unique(row, return_inverse=True)
         time_s = targets.position_ticks[each] / self.context.ticks_per_s
-        velocity = own_velocity(targets, each, time_s)
+        velocity = own_velocity_ned_m_s(targets, each, time_s)
         body = unit_vector(*self.axes.true_direction_in_body(where["azimuth"], where["elevation"]))
         attitude = targets.own_attitude
         if attitude is None or not np.isfinite(velocity).all():
@@ -257,8 +262,8 @@ class RangeBoundaryParameters(RadarParameters):
     )
 
     @model_validator(mode="after")
-    def _carrier(self) -> Self:
-        check_speeds_ascend(self.acquisition)
+    def _check_frequency_and_prf(self) -> Self:
+        check_ranges_cover_all_speeds(self.acquisition)
         for key, off in (("moving_target_filter", "none"), ("range_rate_folds", False)):
             if getattr(self, key) != off and self.frequency_hz is None:
                 raise ValueError(
@@ -328,7 +333,7 @@ class RangeBoundary(Radar):
             *super().warnings(),
             *clutter_as_signal_warnings(self.p, terrain_of(self)),
             *weather_without_carrier_warnings(self),
-            *rain_warnings(self),
+            *rain_echo_warnings(self),
         ]
 
     def look(self, cells: Cells) -> Look:
@@ -349,7 +354,7 @@ class RangeBoundary(Radar):
             detected = margin_db >= 0.0
         detected &= audible
         # Of equal targets the nearer one has the stronger echo.
-        detected &= self.resolve_echoes(cells, np.where(detected, ratio**4, 0.0)) > 0.0
+        detected &= self.merge_echoes_by_cell(cells, np.where(detected, ratio**4, 0.0)) > 0.0
         return Look(detected, margin_db)
 
     def _margin_db(

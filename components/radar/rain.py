@@ -29,12 +29,12 @@ from components.radar.ground_clutter import (
     ground_clutter_rcs_m2,
     ground_ring_rcs_m2,
     height_above_terrain_m,
-    platform_spread_m_s,
+    platform_range_rate_spread_m_s,
     scene_altitude_line_rcs_m2,
     terrain_of,
 )
 from components.radar.pulse_trains.ambiguity import unambiguous_range_m
-from components.radar.resolution import CELL_SIZES, cell_size
+from components.radar.resolution import CELL_SIZES, cell_azimuth_elevation_range
 from components.sensor.look import Cells
 from components.sensor.weather_cells import (
     weather_cells,
@@ -66,7 +66,7 @@ class RainClutter(Effect[Echo]):
         if any(one.rain_rate_mm_h for one in weather_cells(block)):
             somewhere = weather_cells_verdict(block)
             because = because if rate else somewhere.because
-        if (rate or somewhere.simulated) and (why := explain_no_rain_echo(block)):
+        if (rate or somewhere.simulated) and (why := why_no_rain_echo(block)):
             return Verdict(False, why)
         return Verdict(rate > 0 or somewhere.simulated, because)
 
@@ -140,7 +140,7 @@ class RainEcho(Echo):
         speed_m_s = np.sqrt(sum(part * part for part in past))
         # Rounding alone may put a rate beyond the speed that it is part of.
         rate = np.clip(mean, -speed_m_s, speed_m_s)
-        platform = platform_spread_m_s(speed_m_s, rate, self.beam_rad[0])
+        platform = platform_range_rate_spread_m_s(speed_m_s, rate, self.beam_rad[0])
         own = rain_velocity_deviation_m_s(cells.range_m, cells.elevation_rad, self.beam_rad[1])
         return np.asarray(mean), np.hypot(own, platform)
 
@@ -161,7 +161,7 @@ class SidelobeClutter(Effect[Echo]):
         level_db = block.p.sidelobe_level_db
         if level_db is None:
             return Verdict(False, "sidelobe_level_db is not given")
-        if not cell_size(block.p)[2]:
+        if not cell_azimuth_elevation_range(block.p)[2]:
             return Verdict(False, "range_resolution_m is 0: no cell, no clutter in it")
         rain = _rain_rate(block) and block.wavelength_m is not None
         if terrain_of(block) is None and not rain:
@@ -186,7 +186,7 @@ class SidelobeEcho(Echo):
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return the RCS of ground and rain at each cell's range, m², below the sidelobes."""
-        own_alt_m, step_m = cells.of_row("own_alt_m"), self.depth_m
+        own_alt_m, step_m = cells.field_at_rows("own_alt_m"), self.depth_m
         rcs = np.zeros(len(cells))
         lowest_m = -math.inf
         if self.terrain is not None:
@@ -249,7 +249,7 @@ class FoldedClutter(Effect[Echo]):
         if not block.p.range_folds:
             return Verdict(False, "range_folds is false")
         rain = block.context.sections["weather"].rain_rate_mm_h
-        if terrain_of(block) is None and not (rain and not explain_no_rain_echo(block)):
+        if terrain_of(block) is None and not (rain and not why_no_rain_echo(block)):
             return Verdict(False, "there is neither [terrain] height_m nor rain")
         every = " or ".join(f"{unambiguous_range_m(f) / 1e3:.4g}" for f in block.p.prfs_hz)
         return Verdict(True, f"range_folds is true: clutter of every {every} km beside a target's")
@@ -271,16 +271,20 @@ class FoldedEcho(Echo):
         level_db = block.p.sidelobe_level_db
         self._two_way = 0.0 if level_db is None else 10.0 ** (0.2 * level_db)
         rate = self._weather.rain_rate_mm_h
-        rains = rate > 0.0 and not explain_no_rain_echo(block)
+        rains = rate > 0.0 and not why_no_rain_echo(block)
         self._per_m = float(rain_reflectivity_of(block, rate)) if rains else 0.0
 
     def __call__(self, cells: Any) -> FloatArray:
         """Return the folded clutter's RCS for the PRFs that decide, m²."""
-        each = np.stack([self._echo_at_prf(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz])
+        each = np.stack(
+            [self._folded_rcs_and_source_range(cells, prf_hz)[0] for prf_hz in self.block.p.prfs_hz]
+        )
         needed: int = self.block.p.prfs_needed or len(each)
         return np.asarray(np.sort(each, axis=0)[needed - 1])
 
-    def _echo_at_prf(self, cells: Cells, prf_hz: float) -> tuple[FloatArray, FloatArray]:
+    def _folded_rcs_and_source_range(
+        self, cells: Cells, prf_hz: float
+    ) -> tuple[FloatArray, FloatArray]:
         """Return the folded clutter at one PRF as RCS at the target's range (m²), and the range
         where most of it comes from (m).
         """
@@ -288,16 +292,19 @@ class FoldedEcho(Echo):
         for other_m in ambiguous_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
             heard = np.isfinite(other_m) & (other_m >= self._nearest_m)
             at_m = np.where(heard, other_m, 1.0)
-            rcs = np.where(heard, self._rcs_m2(cells, at_m), 0.0) * (cells.range_m / at_m) ** 4
+            rcs = (
+                np.where(heard, self._ground_and_rain_rcs_m2(cells, at_m), 0.0)
+                * (cells.range_m / at_m) ** 4
+            )
             total += rcs
             where = np.where(rcs > most, at_m, where)
             most = np.maximum(most, rcs)
         return total, where
 
-    def _rcs_m2(self, cells: Cells, at_m: FloatArray) -> FloatArray:
+    def _ground_and_rain_rcs_m2(self, cells: Cells, at_m: FloatArray) -> FloatArray:
         """Return the RCS of ground and rain at other ranges of each cell's beam."""
         azimuth, elevation = self.beam_rad
-        own_m, lowest_m = cells.of_row("own_alt_m"), -math.inf
+        own_m, lowest_m = cells.field_at_rows("own_alt_m"), -math.inf
         rcs = np.zeros(len(cells))
         if self.terrain is not None:
             lowest_m = self.terrain.height_m
@@ -328,10 +335,10 @@ class FoldedEcho(Echo):
         """Return mean and spread of the range rate of ground, or of the beam's axis, at the range
         where most of the clutter comes from, m/s.
         """
-        _, at_m = self._echo_at_prf(cells, self.block.p.prf_hz)
+        _, at_m = self._folded_rcs_and_source_range(cells, self.block.p.prf_hz)
         elevation = cells.elevation_rad
         if self.terrain is not None:
-            height_m = cells.of_row("own_alt_m") - self.terrain.height_m
+            height_m = cells.field_at_rows("own_alt_m") - self.terrain.height_m
             elevation = -np.arcsin(np.minimum(height_m / at_m, 1.0))
         level = np.cos(elevation)
         towards = (
@@ -339,16 +346,16 @@ class FoldedEcho(Echo):
         )  # fmt: skip
         rate = -sum(own * part for own, part in zip(own_m_s, towards, strict=True))
         speed_m_s = np.sqrt(sum(part * part for part in own_m_s))
-        platform = platform_spread_m_s(speed_m_s, rate, self.beam_rad[0])
+        platform = platform_range_rate_spread_m_s(speed_m_s, rate, self.beam_rad[0])
         moves_m_s = 0.0 if self.terrain is None else self.terrain.clutter_motion_m_s
         return np.asarray(rate), np.hypot(moves_m_s, platform)
 
 
-def explain_no_rain_echo(block: Any) -> str:
+def why_no_rain_echo(block: Any) -> str:
     """Return why rain has no echo for a radar; empty where it has one."""
     if block.wavelength_m is None:
         return "frequency_hz is not given: how strongly drops scatter follows from it"
-    for width, (beam, step) in zip(cell_size(block.p), CELL_SIZES, strict=True):
+    for width, (beam, step) in zip(cell_azimuth_elevation_range(block.p), CELL_SIZES, strict=True):
         if not width:
             return f"{step} is 0 and {beam} is not given: no cell, no rain in it"
     return ""

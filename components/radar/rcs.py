@@ -13,14 +13,14 @@ from components.aircraft.aircraft import Aircraft
 from components.aircraft.known_targets import offered_rosters
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
     check_swerling_model,
-    finite,
     refuse,
     unflatten,
 )
 from components.geometry import aspect_angles, unit_vector
-from components.sensor.look import Cells, CellValues, aspect_angles_of_cells
+from components.sensor.look import Cells, CellValues, aspect_pitch_roll_elevation_rad
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Context
 from dsa_des.block.effect import Effect, Hook, Verdict
@@ -37,7 +37,7 @@ def fluctuating_rcs(mean_rcs_m2: ArrayLike, uniforms: ArrayLike, model: str) -> 
     Rayleigh in amplitude) and N = 2.
     """
     name = check_swerling_model(model)
-    mean, draw = check_not_negative("mean_rcs_m2", mean_rcs_m2), finite("uniforms", uniforms)
+    mean, draw = check_not_negative("mean_rcs_m2", mean_rcs_m2), check_finite("uniforms", uniforms)
     refuse("uniforms", draw, ~((draw >= 0.0) & (draw < 1.0)), "lie in [0, 1)")
     if name in ("swerling2", "swerling4"):
         if draw.ndim == 0:
@@ -84,13 +84,13 @@ def _aspect_angles(cells: Cells) -> tuple[FloatArray, FloatArray]:
     """Return azimuth and elevation of the radar as seen in each target's body axes, rad."""
     # In a frame turned so that the line of sight has bearing 0, the target's yaw is its relative
     # heading.
-    *turned, elevation = aspect_angles_of_cells(cells)
+    *turned, elevation = aspect_pitch_roll_elevation_rad(cells)
     return aspect_angles(np.zeros(len(cells)), elevation, *turned)
 
 
 def mean_rcs_m2(cells: Cells) -> FloatArray:
     """Return each cell's mean RCS: from the aircraft's table over aspect, else its constant."""
-    rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
+    rcs: FloatArray = cells.column_at_targets(cells.roster.rcs_m2)
     tables, table_of = cells.roster.tables("rcs_table")
     if not tables:
         return rcs
@@ -152,7 +152,7 @@ class RcsFluctuation(Effect[ModelsOfCells]):
 
     def build(self, block: Any) -> ModelsOfCells:
         """Return a function giving cells' Swerling models, each with the cells it applies to."""
-        return fluctuation_models_by_cell(block.p.swerling)
+        return make_swerling_model_lookup(block.p.swerling)
 
 
 class AspectRcs(Effect[CellValues]):
@@ -178,7 +178,7 @@ class AspectRcs(Effect[CellValues]):
         return mean_rcs_m2 if block.p.aspect_rcs else constant_rcs_m2
 
 
-def fluctuation_models_by_cell(swerling: int | None) -> ModelsOfCells:
+def make_swerling_model_lookup(swerling: int | None) -> ModelsOfCells:
     """Return a function giving cells' Swerling models: one for all, or each target's own.
 
     It gives pairs of a model (5 written as 0) and the cells that it holds for.
@@ -190,7 +190,7 @@ def fluctuation_models_by_cell(swerling: int | None) -> ModelsOfCells:
         known = cells.roster.swerling_models
         if len(known) == 1:
             return [(known[0], slice(None))]
-        of_cell = cells.of_target(cells.roster.swerling)
+        of_cell = cells.column_at_targets(cells.roster.swerling)
         pairs = [(model, np.flatnonzero(of_cell == model)) for model in known]
         return [(model, chosen) for model, chosen in pairs if len(chosen)]
 
@@ -204,7 +204,7 @@ def steady_models(cells: Cells) -> list[tuple[int, Any]]:
 
 def constant_rcs_m2(cells: Cells) -> FloatArray:
     """Return the constant RCS of each cell's target, m²."""
-    rcs: FloatArray = cells.of_target(cells.roster.rcs_m2)
+    rcs: FloatArray = cells.column_at_targets(cells.roster.rcs_m2)
     return rcs
 
 

@@ -104,14 +104,14 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
     )
 
     @property
-    def reports_by_cell(self) -> bool:
+    def has_one_report_by_cell(self) -> bool:
         """Whether targets in the same resolution cell give one report."""
         if self.resolution_cells is None:
-            return self.errors != "grid" and not self.sizeless_steps
+            return self.errors != "grid" and not self.zero_steps_without_beamwidth
         return self.resolution_cells
 
     @property
-    def sizeless_steps(self) -> list[str]:
+    def zero_steps_without_beamwidth(self) -> list[str]:
         """Names of the grid steps that are 0 and have no beamwidth instead."""
         return [
             step
@@ -132,12 +132,12 @@ class ResolutionParameters(RangeErrorParameters, SensorParameters):
     def _cells_have_a_size(self) -> Self:
         Disagreements.raise_if_any(
             f"{step} is 0 and resolution_cells is true: a cell has a size, it must be above 0"
-            for step in (self.sizeless_steps if self.resolution_cells else ())
+            for step in (self.zero_steps_without_beamwidth if self.resolution_cells else ())
         )
         return self
 
 
-def cell_size(parameters: Any) -> tuple[float, float, float]:
+def cell_azimuth_elevation_range(parameters: Any) -> tuple[float, float, float]:
     """Return a cell's azimuth, elevation (rad), range (m): the beamwidth, else the grid step."""
     widths = [
         getattr(parameters, beam, None) or getattr(parameters, step) for beam, step in CELL_SIZES
@@ -148,9 +148,10 @@ def cell_size(parameters: Any) -> tuple[float, float, float]:
 def cells_of_radar(block: Any) -> ResolutionCells:
     """Return the resolution cells of a radar block from its minimum range to ``range_km``."""
     p = block.p
-    if p.sizeless_steps:
+    if p.zero_steps_without_beamwidth:
         raise ValueError(
-            f"{p.sizeless_steps[0]} is 0: false alarms are counted by resolution cells, it must "
+            f"{p.zero_steps_without_beamwidth[0]} is 0: false alarms are counted by resolution "
+            f"cells, it must "
             "be above 0"
         )
     if p.range_km is None:
@@ -165,7 +166,9 @@ def cells_of_radar(block: Any) -> ResolutionCells:
     # Where ranges fold there are no cells beyond.
     far_m = min(block.reach.range_max_m, p.farthest_report_m)
     reach = replace(block.reach, range_max_m=far_m)
-    return ResolutionCells.from_reach(reach, block.budget.nearest_m, cell_size(p))
+    return ResolutionCells.from_reach(
+        reach, block.budget.nearest_m, cell_azimuth_elevation_range(p)
+    )
 
 
 class Merging:
@@ -173,7 +176,7 @@ class Merging:
 
     def __init__(self, block: Any) -> None:
         self._block = block
-        self._widths = cell_size(block.p)
+        self._widths = cell_azimuth_elevation_range(block.p)
 
     def __call__(self, cells: Cells, power: FloatArray) -> FloatArray:
         """Return each cell's summed power for its strongest echo, and 0 for the others."""
@@ -235,10 +238,14 @@ class OneReportByCell(Effect[Merging]):
         """Return whether targets merge into one report a cell: needs ``resolution_cells``."""
         p = block.p
         if p.resolution_cells is None and p.errors != "grid":
-            if p.sizeless_steps:
-                return Verdict(False, f"{p.sizeless_steps[0]} is 0: a cell has no size")
+            if p.zero_steps_without_beamwidth:
+                return Verdict(
+                    False, f"{p.zero_steps_without_beamwidth[0]} is 0: a cell has no size"
+                )
             return Verdict(True, f"errors is '{p.errors}', and resolution_cells not false")
-        return Verdict(p.reports_by_cell, f"resolution_cells is {str(p.reports_by_cell).lower()}")
+        return Verdict(
+            p.has_one_report_by_cell, f"resolution_cells is {str(p.has_one_report_by_cell).lower()}"
+        )
 
 
 class SeemingRange(Protocol):
@@ -285,7 +292,7 @@ class RangeFolding(Effect[SeemingRange]):
                 range_m,
                 prfs_hz=p.prfs_hz,
                 seen=shares >= p.decisive_share(shares),
-                tolerance_m=0.5 * cell_size(p)[2],
+                tolerance_m=0.5 * cell_azimuth_elevation_range(p)[2],
             )
 
         return seeming

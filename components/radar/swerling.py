@@ -12,7 +12,7 @@ from components.radar.detection.ladder import PD_METHOD, ExactDetection, method_
 from components.radar.detection.probability import detection_probability, probability_of_cells
 from components.radar.detection.threshold import Crossing
 from components.radar.ground_clutter import Clutter, terrain_of
-from components.radar.measurement import noise_report_warnings, signal_over_clutter
+from components.radar.measurement import noise_report_warnings, signal_over_noise_and_clutter
 from components.radar.parameters import LinkBudgetParameters
 from components.radar.rcs import (
     FADING,
@@ -21,7 +21,7 @@ from components.radar.rcs import (
     LastingFluctuation,
     ModelsOfCells,
     RcsFluctuation,
-    fluctuation_models_by_cell,
+    make_swerling_model_lookup,
     sampled_scan_rcs_m2,
     steady_models,
 )
@@ -167,7 +167,7 @@ class SwerlingRadar(LinkBudgetRadar):
     def __init__(self, name: str, parameters: Any, context: Any) -> None:
         super().__init__(name, parameters, context)
         # Until the scene's effects are known, as the targets' own models call for.
-        self._models: ModelsOfCells = fluctuation_models_by_cell(parameters.swerling)
+        self._models: ModelsOfCells = make_swerling_model_lookup(parameters.swerling)
         self._method: str = parameters.detection
         self._draws = self.stream("detection")
         self._rcs_draws = self.stream("rcs")
@@ -191,7 +191,7 @@ class SwerlingRadar(LinkBudgetRadar):
         """Return the warnings, with one if scans draw fades more often than they change."""
         return [*super().warnings(), *_fade_rate_warnings(self)]
 
-    def range_slack(self) -> float:
+    def relative_range_tolerance(self) -> float:
         """Return the relative range error that changes Pd by no more than ``[accuracy]`` allows.
 
         SNR goes with the fourth power of range, and Pd changes by max |dPd / d ln SNR| per unit
@@ -216,7 +216,7 @@ class SwerlingRadar(LinkBudgetRadar):
         share = allowed / (4.0 * steepness)
         return share / (1.0 + share)
 
-    def false_alarm_zero_db(self) -> float:
+    def confidence_zero_snr_db(self) -> float:
         """Return the SNR in dB at which Pd is `reference_pd`; confidence is counted from it."""
         return self._snr_at_reference_pd_db((self.p.swerling or 0) % 5)
 
@@ -226,29 +226,33 @@ class SwerlingRadar(LinkBudgetRadar):
         echo = snr > 0.0
         snr_db = 10.0 * np.log10(np.where(echo, snr, np.nan))
         confidence = np.empty(len(cells))
-        for model, chosen in self.models_in_use(cells):
+        for model, chosen in self.swerling_models_and_cells(cells):
             confidence[chosen] = snr_db[chosen] - self._snr_at_reference_pd_db(model)
         pd = np.where(echo, self._pd_of_cells(cells, snr, clutter), 0.0)
         draw = cells.draws(self._draws)
         extras = {"snr_db": snr_db, "detection_probability": pd}
         noise = (
-            draw >= self._target_detection_probability(cells, pd, clutter)
+            draw >= self._pd_beyond_noise_alone(cells, pd, clutter)
             if self.p.errors == "signal"
             else None
         )
         tail = np.clip(draw / np.maximum(pd, 1e-300), 0.0, 1.0)
         cnr = None if clutter is None else clutter.total
-        return Look(draw < pd, confidence, extras, signal_over_clutter(snr, cnr), noise, tail)
+        return Look(
+            draw < pd, confidence, extras, signal_over_noise_and_clutter(snr, cnr), noise, tail
+        )
 
-    def _target_detection_probability(
+    def _pd_beyond_noise_alone(
         self, cells: Cells, pd: FloatArray, clutter: Clutter | None
     ) -> FloatArray:
-        """Return the probability that the target is detected in addition to noise alone.
+        """Return Pd without noise's share: p in Pd = 1 - (1 - Pfa)(1 - p), at least 0.
 
         As if noise and target were detected independently, Pd = 1 - (1 - Pfa)(1 - this).
         """
         pfa: Any = self.p.false_alarm_probability
-        if clutter is not None or (cells.cued is not None and self._cued_detector is not None):
+        if clutter is not None or (
+            cells.cued is not None and self._cued_pulses_and_pfa is not None
+        ):
             pfa = self._pd_of_cells(cells, np.zeros(len(cells)), clutter)
         return np.maximum((pd - pfa) / np.maximum(1.0 - pfa, 1e-300), 0.0)
 
@@ -274,7 +278,7 @@ class SwerlingRadar(LinkBudgetRadar):
         return model in (1, 3) or (model in (2, 4) and self.p.pulses_summed == 1)
 
     @property
-    def _cued_detector(self) -> tuple[int, float] | None:
+    def _cued_pulses_and_pfa(self) -> tuple[int, float] | None:
         """Pulses and probability of false alarm inside cue cones; None if the usual ones."""
         p = self.p
         if not (p.cued_pulses or p.cued_false_alarm_probability):
@@ -287,9 +291,9 @@ class SwerlingRadar(LinkBudgetRadar):
     def _pd_of_cells(self, cells: Cells, snr: FloatArray, clutter: Clutter | None) -> FloatArray:
         """Return the probability of detection of each cell, with clutter if there is any."""
         pd = np.empty(len(cells))
-        cued = None if cells.cued is None else self._cued_detector
+        cued = None if cells.cued is None else self._cued_pulses_and_pfa
         usual = self.p.pulses_summed, self.p.false_alarm_probability
-        for model, chosen in self.models_in_use(cells):
+        for model, chosen in self.swerling_models_and_cells(cells):
             beside = None if clutter is None else clutter.take(chosen)
             of_model = self._pd_of_model(snr[chosen], model, beside, *usual)
             if cued is not None:
@@ -350,8 +354,8 @@ class SwerlingRadar(LinkBudgetRadar):
             return None
         return _largest_pd_slope(self.p.pulses_summed, self.p.false_alarm_probability)
 
-    def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
-        """Return pairs of Pd's Swerling model and its cells; 0 for all if the RCS is drawn."""
+    def swerling_models_and_cells(self, cells: Cells) -> list[tuple[int, Any]]:
+        """Return pairs (Swerling model for Pd, its cells); model 0 for all if RCS is drawn."""
         if self.p.samples_rcs:
             return [(0, slice(None))]
         return self._models(cells)
@@ -360,8 +364,8 @@ class SwerlingRadar(LinkBudgetRadar):
         """Return the threshold of a look inside a cue cone; None if it is the same as elsewhere."""
         return (
             None
-            if self._cued_detector is None
-            else Crossing.from_false_alarms(*self._cued_detector)
+            if self._cued_pulses_and_pfa is None
+            else Crossing.from_false_alarms(*self._cued_pulses_and_pfa)
         )
 
     def _snr_at_reference_pd_db(self, model: int) -> float:

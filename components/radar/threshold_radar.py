@@ -31,10 +31,14 @@ from components.radar.ground_clutter import (
     terrain_of,
 )
 from components.radar.link_budget import beam_gain_warnings, implausible_value_warnings
-from components.radar.measurement import MeasuredStrength, signal_over_clutter, signal_variances
+from components.radar.measurement import (
+    MeasuredStrength,
+    signal_over_noise_and_clutter,
+    signal_variances,
+)
 from components.radar.parameters import (
     LinkBudgetParameters,
-    cued_snr_factor,
+    cued_snr_factor_function,
     moved_threshold_warnings,
 )
 from components.radar.radar import Radar
@@ -48,8 +52,8 @@ from components.radar.weather import (
     BlindRange,
     Eclipsing,
     Multipath,
-    gas_left_out_notes,
-    rain_warnings,
+    neglected_gas_loss_notes,
+    rain_echo_warnings,
 )
 from components.sensor.cued_looks import CUE, CUED_LOOKS, cue_warnings
 from components.sensor.look import Cells, CellValues, Look, effect_values_of_cells
@@ -57,7 +61,7 @@ from components.sensor.sensor import CUED_INPUTS
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook
 from dsa_des.block.wake import Wake
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import ticks_to_nanoseconds
 
 
 class ThresholdParameters(LinkBudgetParameters):
@@ -126,7 +130,7 @@ class LinkBudgetRadar(Radar):
         self._beam_shape = self.built_one(BEAM_SHAPE)
         self._propagation = self.built_one(PROPAGATION)
         if self.built(CUE) and self.p.cued_dwell_factor is not None:
-            self.snr_factors = [*self.snr_factors, cued_snr_factor(self.p)]
+            self.snr_factors = [*self.snr_factors, cued_snr_factor_function(self.p)]
         self._set_threshold()
         if noise := self.context.effects.get(FalseAlarms.name):
             noise.refuse_too_many()
@@ -145,11 +149,11 @@ class LinkBudgetRadar(Radar):
         held = wake.held("targets")
         if held is not None and held[0].roster is not self._roster:
             self._roster = held[0].roster
-            self._check_offered(self._roster)
+            self._check_roster_was_offered(self._roster)
         return super().run(wake)
 
-    def _check_offered(self, roster: Roster) -> None:
-        """Raise ValueError if the roster differs from those that were offered before the run."""
+    def _check_roster_was_offered(self, roster: Roster) -> None:
+        """Raise ValueError if the targets are not those that the traffic offered before."""
         known = offered_rosters(self.context)
         if known and not any(roster.names == other.names for other in known):
             raise ValueError(
@@ -183,7 +187,7 @@ class LinkBudgetRadar(Radar):
             snr = snr * self._beam_shape(cells)
         snr, beside = self.filter_echoes(cells, snr, beside)
         clutter = Clutter.sum_echoes(self.echoes, beside, len(cells)) if self.echoes else None
-        return self.resolve_echoes(cells, snr), clutter
+        return self.merge_echoes_by_cell(cells, snr), clutter
 
     @property
     def crossing(self) -> Crossing:
@@ -194,7 +198,9 @@ class LinkBudgetRadar(Radar):
         """Return the threshold of a look inside a cue cone; None if it is the same as elsewhere."""
         return None
 
-    def crossings_of(self, cells: Cells, detected: IntArray) -> list[tuple[Crossing, IntArray]]:
+    def crossings_with_positions(
+        self, cells: Cells, detected: IntArray
+    ) -> list[tuple[Crossing, IntArray]]:
         """Return pairs of a threshold and the positions of the detected cells it applies to."""
         cued = self.cued_crossing()
         if cued is None or cells.cued is None:
@@ -202,11 +208,11 @@ class LinkBudgetRadar(Radar):
         inside = cells.cued[detected]
         return [(cued, np.flatnonzero(inside)), (self.crossing, np.flatnonzero(~inside))]
 
-    def models_in_use(self, cells: Cells) -> list[tuple[int, Any]]:
-        """Return pairs of Pd's Swerling model and its cells; here model 0 (steady) for all."""
+    def swerling_models_and_cells(self, cells: Cells) -> list[tuple[int, Any]]:
+        """Return pairs (Swerling model for Pd, its cells); here model 0 (steady) for all."""
         return [(0, slice(None))]
 
-    def false_alarm_zero_db(self) -> float:
+    def confidence_zero_snr_db(self) -> float:
         """Return the SNR in dB at which the confidence of a false alarm is 0."""
         raise TypeError(f"{type(self).__name__} does not say what its confidence is measured from")
 
@@ -231,10 +237,10 @@ class LinkBudgetRadar(Radar):
         outside; None keeps all.
         """
         if self.p.measures_range_rate:
-            range_rate = self.noise_range_rate(rate, where, targets, rows[row])
+            range_rate = self.random_range_rates_m_s(rate, where, targets, rows[row])
             where = {**where, "range_rate": range_rate}
         scan, tick, run = detections.scan[row], detections.tick[row], detections.run[row]
-        instant_ns = nanosecond_of(tick, self.context.ticks_per_s)
+        instant_ns = ticks_to_nanoseconds(tick, self.context.ticks_per_s)
         azimuth, elevation, range_m, measured = self.report_false_alarms(
             where, {"snr": snr}, (key, scan, instant_ns, run)
         )
@@ -251,7 +257,7 @@ class LinkBudgetRadar(Radar):
             azimuth_rad=azimuth[kept],
             elevation_rad=elevation[kept],
             range_m=range_m[kept],
-            confidence=(snr_db - self.false_alarm_zero_db())[kept],
+            confidence=(snr_db - self.confidence_zero_snr_db())[kept],
             extras={name: values[kept] for name, values in extras.items()},
             measured={name: values[kept] for name, values in measured.items()},
         )
@@ -276,7 +282,7 @@ class LinkBudgetRadar(Radar):
 
     def skipped_work_notes(self) -> list[str]:
         """Return sentences on attenuation that the scene leaves out, and on ambiguous echoes."""
-        said = [*super().skipped_work_notes(), *gas_left_out_notes(self)]
+        said = [*super().skipped_work_notes(), *neglected_gas_loss_notes(self)]
         if self.p.prf_hz is not None and self.p.range_km is None and not self.p.range_folds:
             range_km = self.stated_reach.range_max_m / 1000.0
             said.append(
@@ -297,12 +303,12 @@ class LinkBudgetRadar(Radar):
             *false_alarm_count_warnings(self),
             *clutter_as_signal_warnings(self.p, terrain_of(self)),
             *beam_gain_warnings(self.p),
-            *rain_warnings(self),
-            *gas_left_out_notes(self),
+            *rain_echo_warnings(self),
+            *neglected_gas_loss_notes(self),
         ]
 
     def report(self) -> dict[str, Any]:
-        """Return the bandwidth in use, and how the time of a scan is spent where it costs."""
+        """Return the bandwidth in use and how a scan's time is spent, for the run's summary."""
         return {
             **super().report(),
             "link_budgets": {self.name: {"bandwidth_hz": float(self.budget.bandwidth_hz)}},
@@ -357,7 +363,7 @@ class ThresholdRadar(LinkBudgetRadar):
         given = "" if self.p.threshold_db is not None else " (not given)"
         return f"threshold_db{given} is {self.threshold_db:g}"
 
-    def false_alarm_zero_db(self) -> float:
+    def confidence_zero_snr_db(self) -> float:
         """Return the threshold in dB, from which the confidence of a false alarm is counted."""
         return self.threshold_db
 
@@ -372,7 +378,9 @@ class ThresholdRadar(LinkBudgetRadar):
             margin = margin + 10.0 * np.log10(1.0 + cnr / np.where(echo, snr, 1.0))
         elif cnr is not None:
             margin = margin - 10.0 * np.log10(1.0 + cnr)
-        return Look(margin >= 0.0, margin, {"snr_db": snr_db}, signal_over_clutter(snr, cnr))
+        return Look(
+            margin >= 0.0, margin, {"snr_db": snr_db}, signal_over_noise_and_clutter(snr, cnr)
+        )
 
     def _threshold_of(self, cells: Cells) -> Any:
         """Return the threshold in dB: one for all, or each cell's own where some are cued."""

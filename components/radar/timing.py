@@ -109,7 +109,7 @@ class TimeBudgetParameters(PulseTrainParameters, ResolutionParameters):
     )
 
     @model_validator(mode="after")
-    def _time(self) -> Self:
+    def _check_scan_time_keys(self) -> Self:
         if self.beam_shape_loss and self.beams is None:
             raise ValueError(
                 "beam_shape_loss is true and azimuth_beamwidth_deg and elevation_beamwidth_deg "

@@ -16,8 +16,8 @@ from components.atmosphere.slant_path import (
 )
 from components.environment.tables import Weather
 from components.radar.ground_clutter import terrain_of
-from components.radar.rain import explain_no_rain_echo
-from components.radar.resolution import cell_size
+from components.radar.rain import why_no_rain_echo
+from components.radar.resolution import cell_azimuth_elevation_range
 from components.sensor.look import Cells, CellValues
 from components.sensor.weather_cells import (
     entry_and_exit_heights_m,
@@ -106,7 +106,7 @@ class Multipath(Effect[CellValues]):
         """Return a function that gives the factor on each target's echo by the reflected ray."""
         if not self.verdict(block).simulated:
             return lambda cells: np.ones(len(cells))
-        terrain, (_, beam_rad, depth_m) = terrain_of(block), cell_size(block.p)
+        terrain, (_, beam_rad, depth_m) = terrain_of(block), cell_azimuth_elevation_range(block.p)
         keys = {
             "wavelength_m": block.wavelength_m,
             "permittivity": terrain.permittivity(block.wavelength_m),
@@ -117,7 +117,7 @@ class Multipath(Effect[CellValues]):
         }
 
         def factor(cells: Cells) -> FloatArray:
-            own_m = cells.of_row("own_alt_m") - terrain.height_m
+            own_m = cells.field_at_rows("own_alt_m") - terrain.height_m
             far_m = np.maximum(cells.range_m, 1.0)
             return np.asarray(
                 two_ray_power_factor(far_m, own_m, cells.alt_m - terrain.height_m, **keys)
@@ -153,17 +153,17 @@ class Attenuation(Effect[CellValues]):
         """Return a function giving cells' SNR factor by the loss on the path both ways."""
         if block.wavelength_m is None:
             return lambda cells: np.ones(len(cells))
-        table = self._table(block)
+        table = self._attenuation_table_of_effect(block)
 
         def factor(cells: Cells) -> FloatArray:
             loss_db = one_way_attenuation_db(
-                cells.range_m, cells.of_row("own_alt_m"), cells.alt_m, table
+                cells.range_m, cells.field_at_rows("own_alt_m"), cells.alt_m, table
             )
             return two_way_transmission(loss_db)
 
         return factor
 
-    def _table(self, block: Any) -> AttenuationTable:
+    def _attenuation_table_of_effect(self, block: Any) -> AttenuationTable:
         settings = self.table_arguments(block.context.sections["weather"], block)
         return attenuation_table(
             SPEED_OF_LIGHT_M_S / block.wavelength_m, **{"gas": False, **settings}
@@ -180,12 +180,12 @@ class Attenuation(Effect[CellValues]):
         steepness = block.largest_pd_slope() if hasattr(block, "largest_pd_slope") else None
         if not math.isfinite(reach_m) or steepness is None:
             return {}
-        most_db = 2.0 * worst_one_way_db(self._table(block), reach_m)
+        most_db = 2.0 * largest_one_way_loss_db(self._attenuation_table_of_effect(block), reach_m)
         influence = steepness * most_db * math.log(10.0) / 10.0
         return {"detection_probability": min(1.0, influence)}
 
 
-def worst_one_way_db(table: AttenuationTable, reach_m: float) -> float:
+def largest_one_way_loss_db(table: AttenuationTable, reach_m: float) -> float:
     """Return the largest one-way loss of any path up to `reach_m` long, dB."""
     altitudes = np.arange(-1000.0, 40_001.0, 25.0)
     level = one_way_attenuation_db(np.full(altitudes.shape, reach_m), altitudes, altitudes, table)
@@ -222,7 +222,7 @@ class Gas(Attenuation):
         return {"gas": weather.gas, "vapour_density_g_m3": weather.vapour_density_g_m3}
 
 
-def rain_warnings(block: Any) -> list[str]:
+def rain_echo_warnings(block: Any) -> list[str]:
     """Return a warning where rain has no echo, or where its echo is overestimated."""
     weather = block.context.sections.get("weather")
     rains = weather is not None and any(c.rain_rate_mm_h for c in (weather, *weather.cells))
@@ -230,7 +230,7 @@ def rain_warnings(block: Any) -> list[str]:
         return []
     if block.wavelength_m is None:
         return []  # said of all weather
-    if why := explain_no_rain_echo(block):
+    if why := why_no_rain_echo(block):
         return [f"rain has no echo for this radar: {why}"]
     frequency_hz = SPEED_OF_LIGHT_M_S / block.wavelength_m
     if frequency_hz <= HIGHEST_RAYLEIGH_HZ:
@@ -247,8 +247,9 @@ _GAS_MATTERS_HZ = 10e9
 _RANGE_WITHOUT_ONE_M = 10e3
 
 
-def gas_left_out_notes(block: Any) -> list[str]:
-    """Return a sentence on clear-air loss of a radar above 10 GHz in a scene without gas.
+def neglected_gas_loss_notes(block: Any) -> list[str]:
+    """Return in a list a note on clear-air loss that a radar above 10 GHz neglects, or an empty
+    list.
 
     It is not on by default: a radar calibrated by a range that was measured through air has the air
     in its calibration already, and scenes keep their values.
@@ -319,7 +320,9 @@ class CellsOfWeather(Effect[CellValues]):
         return weather_cells_verdict(block)
 
     def build(self, block: Any) -> CellValues:
-        """Return a function that gives the factor on each cell's SNR by the weather cells."""
+        """Return a function giving the factor on the SNR of each (scan, target) pair by loss in
+        weather cells.
+        """
         if not weather_cells(block) or block.wavelength_m is None:
             return lambda cells: np.ones(len(cells))
         weather, tables = block.context.sections["weather"], []

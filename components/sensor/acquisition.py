@@ -7,7 +7,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from components.geometry import POSITION_FIELDS, north_east_up
+from components.geometry import POSITION_FIELDS, north_east_up_offsets_m
 from components.sensor.look import Cells
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Parameters
@@ -49,7 +49,7 @@ class AcquisitionRange(Parameters):
         return self
 
 
-def check_speeds_ascend(ranges: tuple[AcquisitionRange, ...]) -> None:
+def check_ranges_cover_all_speeds(ranges: tuple[AcquisitionRange, ...]) -> None:
     """Raise ValueError unless the speed limits ascend and the last acquisition range has no limit,
     so that it covers every faster target.
     """
@@ -119,12 +119,14 @@ def target_ground_speed_m_s(cells: Cells) -> FloatArray:
     """
     speed, which = np.full(len(cells), np.nan), np.arange(len(cells))
     for step_s in (STEP_S, -STEP_S):
-        seen = cells.seen_at(np.tile(which, 2), np.repeat([0.0, step_s], len(which)))
+        seen = cells.relative_target_fields_ahead(
+            np.tile(which, 2), np.repeat([0.0, step_s], len(which))
+        )
         now, then = (
             [seen[f"target_{name}"][part] for name in POSITION_FIELDS]
             for part in (slice(None, len(which)), slice(len(which), None))
         )
-        north, east, _ = north_east_up(*now, *then)
+        north, east, _ = north_east_up_offsets_m(*now, *then)
         there = seen["present"].reshape(2, -1).all(axis=0)
         speed[which[there]] = np.hypot(north, east)[there] / STEP_S
         which = which[~there]

@@ -16,13 +16,13 @@ from dsa_des.arrays.column_values import take_rows
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 
 #: The input over which they come.
 PORT = "cues"
 
 
-def believed_ownship_pose(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
+def believed_ownship_pose_columns(targets: RelativeTargets, rows: IntArray) -> dict[str, Any]:
     """Return the position and attitude that the ownship believes to have at each scan, as columns
     of `Detections` by name; empty if navigation is exact.
     """
@@ -72,11 +72,11 @@ class ConesAhead:
         cued = counts > 0
         old = cued & (np.bincount(scan[live], minlength=len(counts)) == 0)
         run = wake.run
-        self._old = add_cases(self._old, run[old], run[cued])
+        self._old = counts_with_cases_added(self._old, run[old], run[cued])
         scan, entry, time_s = scan[live], entry[live], time_s[live]
         if len(scan) == 0:
             return None
-        pose = believed_ownship_pose(targets, rows[scan])
+        pose = believed_ownship_pose_columns(targets, rows[scan])
         if not pose:
             raise ValueError("cues need the ownship's pose, which these targets come without")
         own = list(pose.values())
@@ -151,7 +151,9 @@ class CuedLooks(Effect[ConesAhead]):
     acts_on = CUE
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether cue cones are simulated, and why: only if a block cues this sensor."""
+        """Return whether cue cones are simulated, and why: only if another block sends cues to this
+        sensor.
+        """
         sources = _cueing_blocks(block)
         if not sources:
             return Verdict(False, "no wire brings cues")
@@ -181,7 +183,9 @@ def refuse_if_cued(block: Any, because: str = _NO_THRESHOLD) -> None:
 
 
 def cue_warnings(block: Any) -> list[str]:
-    """Return a warning if a cued sensor has no cued_* key, or such keys have nothing cueing it."""
+    """Return a warning if a cued sensor sets no cued_* key, or an uncued one sets one; else
+    nothing.
+    """
     given = [
         name
         for name in type(block.p).model_fields

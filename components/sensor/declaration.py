@@ -21,7 +21,9 @@ from dsa_des.block.effect import Effect, Verdict
 
 
 def empty_look_memory(n: int, targets: int) -> BoolArray:
-    """Return the memory before the first look: shape (targets, n - 1), all misses."""
+    """Return the memory before any look: (targets, n - 1), all False as if the last looks had
+    missed.
+    """
     return np.zeros((targets, n - 1), dtype=bool)
 
 
@@ -68,13 +70,15 @@ class DeclarationRule(Effect[Judging]):
         m, n = block.p.declare_m, block.p.declare_n
         if m is None:
             return Verdict(False, "declare_m and declare_n are not given")
-        if block.p.declares_by == "place":
+        if block.p.declares_by_target_or_place == "place":
             return Verdict(False, "places are declared, not targets")
         return Verdict(True, f"declare_m is {m} and declare_n is {n}")
 
     def build(self, block: Any) -> Declarations:
         """Return the declaration rule of this sensor, 1 of 1 by default."""
-        if block.p.declares_by == "place":  # built all the same, it declares whatever is reported
+        if (
+            block.p.declares_by_target_or_place == "place"
+        ):  # built all the same, it declares whatever is reported
             return Declarations(1, 1)
         return Declarations(block.p.declare_m or 1, block.p.declare_n or 1)
 
@@ -111,7 +115,9 @@ class Declarations:
         return replace(look, extras={**look.extras, "declared": declared})
 
     def _grow_memory(self, count: int) -> None:
-        """Enlarge the arrays per target to `count`; new ones have no detection or declaration."""
+        """Enlarge the arrays per target to `count` targets; those added start undetected and
+        undeclared.
+        """
         more = count - len(self._memory)
         self._memory = np.concatenate([self._memory, empty_look_memory(self.n, more)])
         self._first_tick = np.append(self._first_tick, np.full(more, -1))
@@ -126,7 +132,7 @@ class Declarations:
         self._first_tick[target[new]] = cells.scan_ticks[cells.row[first]]
         self._first_range_m[target[new]] = cells.range_m[first]
 
-    def first_declarations(self) -> dict[str, tuple[int, float]]:
+    def first_declaration_tick_and_range(self) -> dict[str, tuple[int, float]]:
         """Return by name each declared target's first declaration tick and true range then, m."""
         firsts = zip(self._first_tick.tolist(), self._first_range_m.tolist(), strict=True)
         return {name: one for name, one in zip(self.names, firsts, strict=True) if one[0] >= 0}
@@ -288,7 +294,7 @@ class DeclaredPlaces:
 
     def __call__(self, detections: Detections, targets: Any, rows: Any) -> Detections:
         """Return the report with a column ``declared``."""
-        new = self._places(detections)
+        new = self._places_of_detections(detections)
         known, asked = new, np.arange(len(new))
         if self._memory is not None:
             known = self._memory.append(new)
@@ -302,14 +308,14 @@ class DeclaredPlaces:
         declared = company >= self.m
         if len(detections):
             self._memory = known.take(
-                known.scan > self._last_scan_of_runs(detections, known) - self.n + 1
+                known.scan > self._last_run_scan_by_place(detections, known) - self.n + 1
             )
         self._store_first_declarations(
             detections, np.flatnonzero(declared & (detections.target >= 0))
         )
         return replace(detections, extras={**detections.extras, "declared": declared})
 
-    def _last_scan_of_runs(self, detections: Detections, known: SeenPlaces) -> IntArray:
+    def _last_run_scan_by_place(self, detections: Detections, known: SeenPlaces) -> IntArray:
         """Return, for each place in `known`, the number of the last scan of its run in these
         detections, or its own scan if its run has none there.
         """
@@ -318,7 +324,7 @@ class DeclaredPlaces:
         index = np.minimum(np.searchsorted(runs, known.run), len(runs) - 1)
         return np.where(runs[index] == known.run, last[index], known.scan)
 
-    def _places(self, detections: Detections) -> SeenPlaces:
+    def _places_of_detections(self, detections: Detections) -> SeenPlaces:
         counts = np.diff(detections.offsets)
         direction = unit_vector(detections.azimuth_rad, detections.elevation_rad)
         own = detections.pose_columns()
@@ -345,7 +351,7 @@ class DeclaredPlaces:
             tick = int(detections.tick[row[entry]])
             self._first.setdefault(self.names[index], (tick, float(detections.true_range_m[entry])))
 
-    def first_declarations(self) -> dict[str, tuple[int, float]]:
+    def first_declaration_tick_and_range(self) -> dict[str, tuple[int, float]]:
         """Return by name each declared target's first declaration tick and true range then, m."""
         return self._first
 
@@ -370,6 +376,6 @@ class DeclarationByPlace(Effect[ReportTransform]):
         because = "the sensor has false alarms, and declare_by is not 'target'"
         if p.declare_by is not None:
             because = f"declare_by is '{p.declare_by}'"
-        elif p.declares_by == "target":
+        elif p.declares_by_target_or_place == "target":
             because = "without false alarms all that is detected are targets"
-        return Verdict(p.declares_by == "place", because)
+        return Verdict(p.declares_by_target_or_place == "place", because)

@@ -39,7 +39,7 @@ class Wander:
         #: Mean squares of the extent across and along a level line of sight, and upward, m².
         self._level2, self._upward2 = 0.5 * (length2 + span2), height2
         band = getattr(block, "areas", "") or "eo"
-        shown = np.concatenate([_mean_level_area_m2(roster, band) for roster in rosters])
+        shown = np.concatenate([_mean_horizontal_view_area_m2(roster, band) for roster in rosters])
         #: Area that shows on a level line of sight, from any side, m².
         self._area_m2 = max(float(np.mean(shown)), _LEAST_AREA_M2)
 
@@ -75,8 +75,10 @@ class Wander:
         azimuth, elevation = body_angles(x, y, z)
         return azimuth, elevation, np.sqrt(x * x + y * y + z * z)
 
-    def lasting_parts(self) -> dict[str, list[LastingPart]]:
-        """Return by quantity (angles, range) the glint that stays correlated between looks."""
+    def correlated_parts_by_quantity(self) -> dict[str, list[LastingPart]]:
+        """Return, by quantity (azimuth, elevation, range), the parts of glint that stay correlated
+        between looks.
+        """
         share2, lasts_s = self._share**2, self._lasts_s
         return {
             "azimuth": [LastingPart(lasts_s=lasts_s, across_m2=share2 * self._level2)],
@@ -84,7 +86,7 @@ class Wander:
             "range": [LastingPart(share2 * self._level2, lasts_s)],
         }
 
-    def variances(
+    def added_variances_by_quantity(
         self,
         values: Mapping[str, FloatArray],
         signal: Mapping[str, FloatArray],
@@ -143,7 +145,7 @@ class Glint(Effect[Wander]):
         return Verdict(share > 0.0, f"glint_share is {share:g}")
 
 
-def _mean_level_area_m2(roster: Roster, band: str) -> FloatArray:
+def _mean_horizontal_view_area_m2(roster: Roster, band: str) -> FloatArray:
     """Return each aircraft's projected area, m², seen horizontally, averaged over headings."""
     front, side = (roster.column(f"{band}.{body}_m2") for body in ("front", "side"))
     if band == "ir":

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from components.geometry import TWO_PI, remainder, unwrap_sector, wrap_pi
-from dsa_des.arrays.column_values import constant_column, null_float_column
+from dsa_des.arrays.column_values import constant_column, shared_nan_column
 from dsa_des.arrays.types import FloatArray
 
 # A limit that misses a grid point by no more than this share of itself counts as lying on it: 110
@@ -75,7 +75,7 @@ class Grid:
         if self.step == 0.0:
             result = values
         elif values.size <= _FEW and values.ndim == 1:
-            return np.array(self._round_few(values.tolist()))
+            return np.array(self._round_short_list(values.tolist()))
         else:
             size = np.abs(values)
             # NaN, and what cannot be counted in steps, take the general way.
@@ -90,7 +90,7 @@ class Grid:
             result = np.maximum(result, self._lowest)
         return result + 0.0  # adding 0 turns -0 into 0
 
-    def _round_few(self, values: list[float]) -> list[float]:
+    def _round_short_list(self, values: list[float]) -> list[float]:
         """Return a short list's values, each rounded exactly as by `_round_countable`."""
         step, countable, low, high = self.step, self._countable, self._lowest, self._highest
         results = []
@@ -114,8 +114,10 @@ class Grid:
         return results
 
 
-def _split_steps(size: Any, steps: Any) -> tuple[Any, Any, Any]:
-    """Return for sizes >= 0 where rounding applies (mask), the whole steps, exact remainder."""
+def _mask_steps_and_remainders(size: Any, steps: Any) -> tuple[Any, Any, Any]:
+    """Return, for sizes >= 0, a mask of where rounding applies, the number of whole steps, and the
+    remainder.
+    """
     counts = (steps > 0.0) & (size * _COUNTABLE < steps) & (size < _LARGEST)
     spacing = np.where(counts, steps, 1.0)
     size = np.where(counts, size, 0.0)
@@ -127,7 +129,7 @@ def _round_to_grid(size: Any, steps: Any) -> Any:
     """Return sizes >= 0 rounded to the nearest multiple of their step, ties to even; a size that
     cannot be counted in steps stays as it is.
     """
-    counts, whole, rest = _split_steps(size, steps)
+    counts, whole, rest = _mask_steps_and_remainders(size, steps)
     return np.where(counts, (whole + _is_rounded_up(whole, rest, steps)) * steps, size)
 
 
@@ -148,7 +150,9 @@ def _round_countable(size: FloatArray, step: float) -> FloatArray:
 
 
 def _is_rounded_up(whole: Any, rest: Any, steps: Any) -> Any:
-    """Return which remainders round up (mask), ties only if the number of whole steps is odd."""
+    """Return a mask: True where the remainder exceeds half a step, or is exactly half a step after
+    an odd number of steps.
+    """
     # rest and steps - rest are compared without rounding: below half a step rest is subtracted
     # from the larger, above it the subtraction is exact (Sterbenz).
     other = steps - rest
@@ -160,9 +164,11 @@ def _is_rounded_up(whole: Any, rest: Any, steps: Any) -> Any:
 
 
 def _floor_to_grid(limit: Any, steps: Any) -> Any:
-    """Return the largest multiple of the step up to the limit, allowing for its rounding error."""
+    """Return the largest multiple of the step that exceeds the limit by no more than rounding
+    error.
+    """
     size = np.abs(limit)
-    counts, whole, rest = _split_steps(size, steps)
+    counts, whole, rest = _mask_steps_and_remainders(size, steps)
     above = limit >= 0.0
     # Going down from a negative limit is going up in size.
     near_next = (steps - rest) <= size * _LIMIT_TOLERANCE
@@ -187,7 +193,7 @@ _NEAREST_M = 1e-3
 _grid = lru_cache(maxsize=256)(Grid)
 
 
-def variance_of_step(step: float) -> float:
+def rounding_variance_of_step(step: float) -> float:
     """Return the variance of an error that is uniform over one step of a grid."""
     return step**2 / 12.0
 
@@ -215,7 +221,9 @@ class SensorGrid:
         self._range_step = steps.get("range")
         self._rate_grid = _grid(steps.get("range_rate", 0.0))
         #: Of rounding, by the column that it fills.
-        self.variances = {VARIANCE_OF[name]: variance_of_step(step) for name, step in steps.items()}
+        self.variances = {
+            VARIANCE_OF[name]: rounding_variance_of_step(step) for name, step in steps.items()
+        }
 
     def __call__(self, cells: Any, detected: Any, look: Any, true: Values) -> Measured:
         """Return measured values of true ones by quantity, as `ErrorModel` does."""
@@ -224,7 +232,9 @@ class SensorGrid:
     def measure_false_alarms(
         self, where: Values, signal: Any = None, drawn: Any = None
     ) -> Measured:
-        """Return false alarms' azimuth, elevation, range on the grid, and variances step²/12."""
+        """Return false alarms' azimuth, elevation and range rounded to the grid, and the variances
+        step²/12.
+        """
         line = self.round(where["azimuth"], where["elevation"], where["range"])
         values = dict(zip(("azimuth", "elevation", "range"), line, strict=True))
         if "range_rate" in where:
@@ -237,11 +247,13 @@ class SensorGrid:
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return azimuth, elevation (rad), range (m, may be NaN) rounded and clipped (§3.5.1)."""
+        """Return azimuth, elevation (rad) and range (m; NaN if not measured), rounded and clipped
+        to the grid.
+        """
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:
-            return azimuth, elevation, null_float_column(len(range_m))
+            return azimuth, elevation, shared_nan_column(len(range_m))
         return azimuth, elevation, self._range_grid.round(range_m)
 
     @cached_property
@@ -256,7 +268,9 @@ class SensorGrid:
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
-        """Field of view's lower and upper azimuth, rad; the upper unwrapped, not below lower."""
+        """Lower and upper azimuth of the field of view, rad; 2 pi is added to an upper one below
+        the lower.
+        """
         return unwrap_sector(*self._field)
 
     @cached_property

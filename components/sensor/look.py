@@ -13,7 +13,7 @@ from dsa_des.arrays.entries import rows_and_columns_of_true
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Hook
-from dsa_des.time.clock import NANOSECONDS, nanosecond_of
+from dsa_des.time.clock import NANOSECONDS, ticks_to_nanoseconds
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ class Cells:
 
         A cell that a sweeping beam lights is looked at when it is lit.
         """
-        instant = nanosecond_of(self.scan_ticks[self.row], self._ticks_per_s)
+        instant = ticks_to_nanoseconds(self.scan_ticks[self.row], self._ticks_per_s)
         if hasattr(self._targets, "offset_s"):
             instant = instant + np.rint(self.offset_s * NANOSECONDS).astype(np.int64)
         return instant
@@ -163,9 +163,11 @@ class Cells:
         """
         if self._targets.state_tick is None:
             return self.instant_ns
-        return nanosecond_of(self.of_row("state_tick"), self._ticks_per_s)
+        return ticks_to_nanoseconds(self.field_at_rows("state_tick"), self._ticks_per_s)
 
-    def seen_at(self, cells: IntArray, ahead_s: FloatArray) -> Mapping[str, AnyArray]:
+    def relative_target_fields_ahead(
+        self, cells: IntArray, ahead_s: FloatArray
+    ) -> Mapping[str, AnyArray]:
         """Return the fields of `RelativeTargets` for chosen cells at instants `ahead_s` seconds
         later than the cell's own, one offset per cell.
 
@@ -188,12 +190,14 @@ class Cells:
             row, targets.columns[column], time_s, ahead_s
         )
 
-    def of_row(self, name: str) -> AnyArray:
+    def field_at_rows(self, name: str) -> AnyArray:
         """Return, for each cell, a per-row field (such as own altitude) at the cell's row."""
         return getattr(self._targets, name).take(self._flat // self._width)
 
-    def own_belief(self, name: str) -> FloatArray:
-        """Return, for each cell, one component of the ownship's believed pose."""
+    def believed_pose_component(self, name: str) -> FloatArray:
+        """Return, for each cell, one field by name of the position and attitude that the ownship
+        believes.
+        """
         believed = self._targets.believed
         if believed is None:
             raise ValueError("a block on the way does not say what the ownship believes of itself")
@@ -210,7 +214,7 @@ class Cells:
         yaw, pitch, roll = (attitude[f"{name}_rad"].take(row) for name in ("yaw", "pitch", "roll"))
         return yaw, pitch, roll
 
-    def of_target(self, column: FloatArray) -> AnyArray:
+    def column_at_targets(self, column: FloatArray) -> AnyArray:
         """Return, for each cell, a roster column (a value per aircraft) at its target."""
         return column[self.craft]
 
@@ -226,16 +230,20 @@ class Cells:
 
     @cached_property
     def equipage_rows(self) -> IntArray:
-        """Return the row in the roster's equipage of each cell's target at its instant."""
+        """Return the row of the roster's equipage table that holds for each cell's target at
+        `state_ns`.
+        """
         return self.roster.equipage_rows(self.craft, self.state_ns)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
-        """Return a uniform number in [0, 1) per cell, determined by run, target and scan."""
+        """Return a number in [0, 1) per cell, the same whenever stream, run, target, scan and
+        `draw` are.
+        """
         keys = self.roster.draw_keys_of(self.target)
         return stream.of_runs(self.run, self.instant_ns).uniform(keys, self.scan, draw)
 
 
-def aspect_angles_of_cells(
+def aspect_pitch_roll_elevation_rad(
     cells: Any, chosen: Any = slice(None)
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Return the target's heading relative to the line of sight, its pitch and roll, and the line's

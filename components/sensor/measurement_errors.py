@@ -19,7 +19,7 @@ from components.sensor.grid import (
 )
 from components.sensor.look import Cells, Look
 from components.sensor.parameters import StatedError
-from dsa_des.arrays.column_values import constant_column, null_float_column
+from dsa_des.arrays.column_values import constant_column, shared_nan_column
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.effect import Effect, Hook, Verdict
 from dsa_des.time.gauss_markov import GaussMarkov
@@ -88,13 +88,15 @@ class ErrorModel:
         p = block.p
         self._block, self._signal = block, p.errors == "signal"
         self._places = block.stream("noise places")
-        stated: dict[str, StatedError] = p.stated_errors(block.steps)
+        stated: dict[str, StatedError] = p.stated_errors(block.grid_step_by_quantity)
         self._errors = {
             name: QuantityError(one, block.stream, name) for name, one in stated.items()
         }
         self._variances = {name: one.variance for name, one in stated.items()}
         #: Mean square of errors that are stated as a share of the value, by quantity.
-        self._shares = {name: one.mean_square for name, one in stated.items() if one.share}
+        self._shares = {
+            name: one.mean_square_without_rounding for name, one in stated.items() if one.share
+        }
         self._steps = {name: one.step for name, one in stated.items()}
         self._grids = {
             "azimuth": Grid(self._steps["azimuth"]),
@@ -126,7 +128,8 @@ class ErrorModel:
         run: IntArray,
         instant_ns: IntArray,
     ) -> Values:
-        """Return true values, detections by noise moved randomly in their target's cell.
+        """Return true values, where detections by noise are moved at random within their target's
+        resolution cell.
 
         It errs from there, and states of itself, what any report as strong does: noise does not
         say that it is noise.
@@ -190,7 +193,9 @@ class ErrorModel:
                 variance = variance + self._shares[name] * values[name] ** 2
             columns[VARIANCE_OF[name]] = variance
         if self._block.wander is not None:
-            added = self._block.wander.variances(values, signal, self._block.pixel_rad)
+            added = self._block.wander.added_variances_by_quantity(
+                values, signal, self._block.pixel_rad
+            )
             for name, more in added.items():
                 columns[VARIANCE_OF[name]] = columns[VARIANCE_OF[name]] + more
         return values, columns
@@ -209,7 +214,7 @@ class ErrorModel:
         on_grid = {name: grid.round(values[name]) for name, grid in self._grids.items()}
         on_grid["azimuth"] = wrap_pi_unchecked(on_grid["azimuth"])
         if "range" not in on_grid:
-            on_grid["range"] = null_float_column(len(azimuth))
+            on_grid["range"] = shared_nan_column(len(azimuth))
         else:
             nearest = self._steps["range"] or _NEAREST_M
             on_grid["range"] = np.maximum(np.abs(on_grid["range"]), nearest)
@@ -246,13 +251,15 @@ def lasting_errors(p: Any, steps: Mapping[str, float]) -> dict[str, LastingError
     """Return the sensor errors that last from look to look, by quantity."""
     lasting = {}
     for name, stated in p.stated_errors(steps).items():
-        bias = stated.mean_bias_square
+        bias = stated.mean_square_of_bias
         parts = [LastingPart(bias)] if bias else []
         if stated.correlation_time_s is not None and stated.deviation:
             parts.append(LastingPart(stated.deviation**2, stated.correlation_time_s))
         if stated.share:  # grows with the value: a share of all the variance but rounding's
             rounding = stated.variance
-            shares = [(one.variance / stated.mean_square, one.lasts_s) for one in parts]
+            shares = [
+                (one.variance / stated.mean_square_without_rounding, one.lasts_s) for one in parts
+            ]
             parts = [LastingPart(-one * rounding, lasts_s, share=one) for one, lasts_s in shares]
         if stated.step or parts:
             lasting[name] = LastingError(stated.step, tuple(parts))

@@ -38,7 +38,7 @@ class Measuring(Component):
         return self.built_one(AXES) or _BODY_AXES
 
     @cached_property
-    def _measurement(self) -> ErrorModel | SensorGrid:
+    def _measurement_model(self) -> ErrorModel | SensorGrid:
         """Return the model of measured values and variances: with errors, or on the grid alone."""
         return self.built_one(MEASUREMENT) or self.grid
 
@@ -49,7 +49,7 @@ class Measuring(Component):
 
     @property
     def pixel_rad(self) -> tuple[float, float] | None:
-        """Width and height of a pixel, of a sensor that measures a target's size."""
+        """Width and height of a pixel, rad, if the sensor measures a target's size; else None."""
         return None
 
     def range_rate(self, cells: Cells, detected: IntArray) -> FloatArray | None:
@@ -65,7 +65,7 @@ class Measuring(Component):
         raise TypeError(f"{type(self).__name__} has no signal that errors follow from")
 
     @property
-    def steps(self) -> dict[str, float]:
+    def grid_step_by_quantity(self) -> dict[str, float]:
         """Grid step to which each measured quantity is rounded, by name, in rad, m and m/s."""
         steps = {"azimuth": self.azimuth_step_rad, "elevation": self.elevation_step_rad}
         return {**steps, "range": self.range_step_m} if self.measures_range else steps
@@ -73,7 +73,9 @@ class Measuring(Component):
     @cached_property
     def grid(self) -> SensorGrid:
         """Grid, in sensor axes, to which azimuth, elevation, range and range rate are rounded."""
-        return SensorGrid(self.reach.azimuth_rad, self.reach.elevation_rad, self.steps)
+        return SensorGrid(
+            self.reach.azimuth_rad, self.reach.elevation_rad, self.grid_step_by_quantity
+        )
 
     def _measure(
         self,
@@ -94,7 +96,7 @@ class Measuring(Component):
         true = {"azimuth": azimuth, "elevation": elevation, "range": self.apparent_range_m(range_m)}
         if (rate := self.range_rate(cells, detected)) is not None:
             true["range_rate"] = rate
-        return self._to_body_axes(*self._measurement(cells, detected, look, true))
+        return self._to_body_axes(*self._measurement_model(cells, detected, look, true))
 
     def report_false_alarms(
         self,
@@ -110,7 +112,9 @@ class Measuring(Component):
         without them a position by the edge of the field of view would never be reported beyond it.
         The last value holds the other measured columns of `Detections`.
         """
-        return self._to_body_axes(*self._measurement.measure_false_alarms(where, signal, drawn))
+        return self._to_body_axes(
+            *self._measurement_model.measure_false_alarms(where, signal, drawn)
+        )
 
     def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
@@ -123,4 +127,4 @@ class Measuring(Component):
         beside = {**variances, AZIMUTH: of_angles[0], ELEVATION: of_angles[1]}
         if "range_rate" in values:
             beside["range_rate_m_s"] = values["range_rate"]
-        return *self.axes.to_body(*angles), values["range"], beside
+        return *self.axes.believed_direction_in_body(*angles), values["range"], beside

@@ -6,9 +6,9 @@ from typing import Any
 
 from components.geometry import (
     body_angles,
+    body_angles_of_sight_line,
     body_to_ned,
     rotate_variances,
-    sensor_angles,
     unit_vector,
 )
 from components.messages.reach import Reach, ReasonArray
@@ -49,13 +49,17 @@ class SensorAxes:
         """Return body-axis azimuth, elevation (rad) of sensor-axis directions (true mounting)."""
         return _to_body(azimuth_rad, elevation_rad, self.true_rad)
 
-    def to_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+    def believed_direction_in_body(
+        self, azimuth_rad: FloatArray, elevation_rad: FloatArray
+    ) -> Angles:
         """Return azimuth and elevation in body axes (rad) of directions in the sensor's axes, by
         the mounting angles that the ownship believes.
         """
         return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
 
-    def from_body(self, azimuth_rad: FloatArray, elevation_rad: FloatArray) -> Angles:
+    def believed_direction_in_sensor(
+        self, azimuth_rad: FloatArray, elevation_rad: FloatArray
+    ) -> Angles:
         """Return azimuth and elevation in the sensor's axes (rad) of directions in body axes, by
         the mounting angles that the ownship believes.
         """
@@ -68,7 +72,9 @@ class SensorAxes:
         azimuth_variance_rad2: FloatArray,
         elevation_variance_rad2: FloatArray,
     ) -> Angles:
-        """Return body-axis azimuth and elevation variances (rad²) from the sensor's axes'."""
+        """Return azimuth and elevation variances (rad²) in body axes, converted from the sensor's
+        axes.
+        """
         if self.believed_rad is None:
             return azimuth_variance_rad2, elevation_variance_rad2
         return rotate_variances(
@@ -85,7 +91,7 @@ def _from_body(
 ) -> Angles:
     if mounting_rad is None:
         return azimuth_rad, elevation_rad
-    azimuth, elevation = sensor_angles(azimuth_rad, elevation_rad, *mounting_rad)
+    azimuth, elevation = body_angles_of_sight_line(azimuth_rad, elevation_rad, *mounting_rad)
     return azimuth, elevation
 
 
@@ -104,11 +110,13 @@ class MountedReach(Reach):
     axes: SensorAxes = SensorAxes()
 
     @property
-    def steepest_rad(self) -> float:
-        """Largest elevation that the sensor reaches, measured in body or in its own axes, rad."""
+    def steepest_elevation_rad(self) -> float:
+        """Upper bound, rad, of the absolute elevation in body axes that the tilted field of view
+        reaches.
+        """
         _, elevation, roll = self.axes.true_rad or (0.0, 0.0, 0.0)
         tilt = math.acos(max(-1.0, min(1.0, math.cos(elevation) * math.cos(roll))))
-        return min(0.5 * math.pi, super().steepest_rad + tilt)
+        return min(0.5 * math.pi, super().steepest_elevation_rad + tilt)
 
     def skip_reasons(
         self,
@@ -118,7 +126,9 @@ class MountedReach(Reach):
         present: BoolArray,
         hidden: BoolArray | None = None,
     ) -> ReasonArray:
-        """Return a reason code per target, skipped or evaluated, by angles in body axes."""
+        """Return a code per target: evaluated, or why it is skipped; the given angles are in body
+        axes.
+        """
         angles = self.axes(body_azimuth_rad, body_elevation_rad)
         return super().skip_reasons(*angles, range_m, present, hidden)
 

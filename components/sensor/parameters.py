@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Field, model_validator
 
 from components.geometry import TWO_PI, unwrap_sector
 from components.messages.reach import Reach
-from components.sensor.grid import Grid, variance_of_step
+from components.sensor.grid import Grid, rounding_variance_of_step
 from dsa_des.block.component import ClockedParameters
 from dsa_des.errors import Disagreements
 from dsa_des.time.gauss_markov import LONGEST_S
@@ -34,19 +34,25 @@ class StatedError:
     share: bool
 
     @property
-    def mean_bias_square(self) -> float:
-        """Bias's mean square: a third of its square if drawn for each run, else its square."""
+    def mean_square_of_bias(self) -> float:
+        """Mean square of the bias: a third of its square if it is drawn for each run, else its
+        square.
+        """
         return self.bias**2 / (3.0 if self.drawn_bias else 1.0)
 
     @property
-    def mean_square(self) -> float:
+    def mean_square_without_rounding(self) -> float:
         """Mean square error without rounding: deviation² plus the mean square of the bias."""
-        return self.deviation**2 + self.mean_bias_square
+        return self.deviation**2 + self.mean_square_of_bias
 
     @property
     def variance(self) -> float:
-        """Rounding's variance plus mean square error, the latter unless a share of the value."""
-        return variance_of_step(self.step) + (0.0 if self.share else self.mean_square)
+        """Variance of rounding plus mean square error; rounding's alone if the error is a share of
+        the value.
+        """
+        return rounding_variance_of_step(self.step) + (
+            0.0 if self.share else self.mean_square_without_rounding
+        )
 
 
 class ErrorParameters(ClockedParameters):
@@ -193,7 +199,7 @@ class GlintParameters(ErrorParameters):
         return said
 
 
-def check_azimuths(value: tuple[float, float]) -> tuple[float, float]:
+def check_field_of_view_azimuths(value: tuple[float, float]) -> tuple[float, float]:
     """Return the pair of azimuths (deg, clockwise from first to second) unchanged; ValueError if it
     is no valid field of view.
     """
@@ -204,7 +210,7 @@ def check_azimuths(value: tuple[float, float]) -> tuple[float, float]:
     return value
 
 
-def check_elevations(value: tuple[float, float]) -> tuple[float, float]:
+def check_field_of_view_elevations(value: tuple[float, float]) -> tuple[float, float]:
     """Return the elevations (deg, lower first) unchanged; ValueError if no valid field of view."""
     if not -90 <= value[0] < value[1] <= 90:
         raise ValueError("must hold two angles in [-90, 90], the lower one first")
@@ -226,11 +232,15 @@ class SensorParameters(ErrorParameters):
     )  # fmt: skip
 
     enabled: bool = Field(default=True, description="Whether the sensor is switched on.")
-    azimuth_deg: Annotated[tuple[float, float], AfterValidator(check_azimuths)] = Field(
-        default=(-180.0, 180.0),
-        description="Field of view in azimuth, clockwise from the first to the second, deg.",
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(check_field_of_view_azimuths)] = (
+        Field(
+            default=(-180.0, 180.0),
+            description="Field of view in azimuth, clockwise from the first to the second, deg.",
+        )
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
+    elevation_deg: Annotated[
+        tuple[float, float], AfterValidator(check_field_of_view_elevations)
+    ] = Field(
         default=(-90.0, 90.0), description="Field of view in elevation, lowest and highest, deg."
     )
     range_km: float | None = Field(
@@ -318,19 +328,19 @@ class SensorParameters(ErrorParameters):
             return said + self.note_ineffective(
                 "declare_by", *places, because="declare_m is not given"
             )
-        if self.declares_by == "target":
+        if self.declares_by_target_or_place == "target":
             said += self.note_ineffective(
                 *places, because="looks at targets are counted (declare_by)"
             )
         return said
 
     @property
-    def declares_by(self) -> Literal["target", "place"]:
+    def declares_by_target_or_place(self) -> Literal["target", "place"]:
         """Return whether detections are counted by target or by place."""
         if self.declare_by is not None:
             return self.declare_by
         # Radars and cameras that can have false alarms say so by these.
-        noisy = getattr(self, "reports_noise", getattr(self, "false_alarms", False))
+        noisy = getattr(self, "has_false_alarms", getattr(self, "false_alarms", False))
         return "place" if noisy else "target"
 
     def reach(self) -> Reach:

@@ -20,17 +20,17 @@ from components.messages.detections import (
     LastingError,
     ReportTransform,
     SensorOffer,
-    report_interval_promises,
+    range_and_report_interval_pairs,
 )
-from components.messages.looks import EveryLook, spread_looks
+from components.messages.looks import EveryLook, look_arrays_scans_by_targets
 from components.messages.reach import CULLED, EVALUATE, HIDDEN, SKIP_REASONS, Reach, ReasonArray
 from components.messages.targets import GatedTargets, RelativeTargets
 from components.navigation.errors import (
     NavigationReport,
     lasting_navigation_errors,
-    navigation_noise_deviations,
+    position_and_attitude_deviations,
 )
-from components.sensor.cued_looks import CUE, PORT, ConesAhead, believed_ownship_pose
+from components.sensor.cued_looks import CUE, PORT, ConesAhead, believed_ownship_pose_columns
 from components.sensor.declaration import DeclarationByPlace, DeclarationRule
 from components.sensor.glint import APPARENT_PLACE, Glint
 from components.sensor.grid import AZIMUTH, ELEVATION, VARIANCE_OF
@@ -159,27 +159,28 @@ class Sensor(Measuring):
 
     def request(self, port: str) -> Any:
         """Return the targets this sensor needs: reach in body axes, and accuracy of range."""
-        slack, because = self.range_slack(), self.exact_because()
+        slack, because = self.relative_range_tolerance(), self.why_exact_line_of_sight()
         return replace(self._reach_in_body_axes, range_slack=slack, exact_because=because)
 
-    def range_slack(self) -> float:
-        """Return the largest relative error of range that leaves results within ``[accuracy]``.
+    def relative_range_tolerance(self) -> float:
+        """Return the largest relative range error that keeps results within ``[accuracy]``;
+        infinity: any.
 
         Infinite where nothing that ``[accuracy]`` bounds depends on the range.
         """
         return math.inf
 
-    def exact_because(self) -> str:
+    def why_exact_line_of_sight(self) -> str:
         """Return why the sensor needs an exact line of sight, or an empty string."""
         return ""
 
     def offer(self, port: str) -> Any:
         """Return what this sensor offers: quantities, variances, lasting errors, reach, clock."""
         resolution_rad = max(self.azimuth_step_rad, self.elevation_step_rad)
-        constant: dict[str, Any] = constant_variances(self.p, self.steps)
-        lasting = lasting_errors(self.p, self.steps)
+        constant: dict[str, Any] = constant_variances(self.p, self.grid_step_by_quantity)
+        lasting = lasting_errors(self.p, self.grid_step_by_quantity)
         if Glint().verdict(self).simulated:
-            lasting = add_error_parts(lasting, Glint().build(self).lasting_parts())
+            lasting = add_error_parts(lasting, Glint().build(self).correlated_parts_by_quantity())
         reach = self.stated_reach
         if Mounting().verdict(self).simulated:  # turned, the angles' differ with the direction
             constant = {**constant, AZIMUTH: None, ELEVATION: None}
@@ -191,15 +192,16 @@ class Sensor(Measuring):
                 worst = LastingError(max(one.step for one in angles), parts)
                 lasting |= {"azimuth": worst, "elevation": worst}
         unstated_m2 = 0.0
-        noise = navigation_noise_deviations(self.context)
+        noise = position_and_attitude_deviations(self.context)
         if self.turned_by_belief and any(map(any, noise)):  # differs with the pose
             unstated_m2 = 0.0 if self.measures_range else max(noise[0]) ** 2
             lasting = add_error_parts(lasting, lasting_navigation_errors(self.context))
             constant = {**constant, AZIMUTH: None, ELEVATION: None, VARIANCE_OF["range"]: None}
         return SensorOffer(
-            self.measures_range, resolution_rad, "range_rate" in self.steps, reach=reach,
+            self.measures_range, resolution_rad, "range_rate" in self.grid_step_by_quantity,
+            reach=reach,
             lasting=lasting, clock=self.p.clock_spec, unstated_across_m2=unstated_m2,
-            promises=report_interval_promises(float(1 / self.p.scan_rate_hz)), **constant,
+            promises=range_and_report_interval_pairs(float(1 / self.p.scan_rate_hz)), **constant,
         )  # fmt: skip
 
     @cached_property
@@ -219,7 +221,9 @@ class Sensor(Measuring):
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
-        """Return the message types to record: detections, and all looks if the scene asks."""
+        """Return the types of message to record: detections, and all looks if the scene asks for
+        them.
+        """
         return [self._message, EveryLook] if self._is_every_look_recorded else [self._message]
 
     @cached_property
@@ -314,10 +318,14 @@ class Sensor(Measuring):
             true_elevation_rad=q,
             true_range_m=r,
             **measured,
-            extras={name: values[detected] for name, values in self._extras(cells, look).items()},
+            extras={
+                name: values[detected] for name, values in self._extra_columns(cells, look).items()
+            },
             roster=targets.roster,
-            **believed_ownship_pose(targets, rows),
-            looks=spread_looks(cells, decided, len(wake)) if self._is_every_look_recorded else None,
+            **believed_ownship_pose_columns(targets, rows),
+            looks=look_arrays_scans_by_targets(cells, decided, len(wake))
+            if self._is_every_look_recorded
+            else None,
         )
         detections.row_of_entries = row
         for report in self._report_transforms:
@@ -326,7 +334,7 @@ class Sensor(Measuring):
             detections = self._cue_cones.mark_cued_false_alarms(detections)
         return detections
 
-    def _extras(self, cells: Cells, look: Look) -> Mapping[str, Any]:
+    def _extra_columns(self, cells: Cells, look: Look) -> Mapping[str, Any]:
         """Return extra columns to record per cell: the look's, and ``cued`` with cues received."""
         if self._cue_cones is None:
             return look.extras
@@ -335,7 +343,9 @@ class Sensor(Measuring):
     def cells(
         self, targets: RelativeTargets, rows: IntArray, wake: Wake
     ) -> tuple[Cells, ReasonArray]:
-        """Return the (scan, target) cells to compute, and for all scans and targets why or not."""
+        """Return the (scan, target) pairs to evaluate, and a code for all: evaluated, or why
+        skipped.
+        """
         reason = self._reasons_of_scans(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
@@ -346,8 +356,14 @@ class Sensor(Measuring):
         return {} if self._cue_cones is None else self._cue_cones.failure_counts()
 
     def report(self) -> dict[str, Any]:
-        """Return each target's first declaration, tick and range, if there is such a rule."""
-        rule = "declaration" if self.p.declares_by == "target" else "declaration by place"
+        """Return each target's first declaration (time and true range), or None; empty without such
+        a rule.
+        """
+        rule = (
+            "declaration"
+            if self.p.declares_by_target_or_place == "target"
+            else "declaration by place"
+        )
         declarations = self.context.effects.get(rule)
         if declarations is None or self.p.declare_m is None:
             return {}
@@ -355,7 +371,7 @@ class Sensor(Measuring):
         # A window may have looked beyond an early end of the run.
         end_tick = self.context.duration_s * ticks_per_s
         first: dict[str, dict[str, float] | None] = dict.fromkeys(declarations.names)
-        for target, (tick, range_m) in declarations.first_declarations().items():
+        for target, (tick, range_m) in declarations.first_declaration_tick_and_range().items():
             if tick < end_tick:
                 first[target] = {"time_s": tick / ticks_per_s, "range_m": range_m}
         return {"declarations": {self.name: first}}

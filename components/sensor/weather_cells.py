@@ -67,16 +67,18 @@ def _min_cell_distances_m(block: Any) -> list[float] | None:
 
 
 def weather_cells_on_sight_lines(block: Any, cells: Cells) -> Iterator[tuple[WeatherCell, Within]]:
-    """Yield each weather cell with the part (from, to as shares) of every line of sight in it."""
-    place = [cells.of_row(f"own_{name}") for name in ("lat_deg", "lon_deg", "alt_m")]
+    """Yield each weather cell and where each line of sight enters and leaves it, as shares of its
+    length.
+    """
+    place = [cells.field_at_rows(f"own_{name}") for name in ("lat_deg", "lon_deg", "alt_m")]
     line = cells.azimuth_rad, cells.elevation_rad, cells.range_m
     time_s = cells.state_ns / NANOSECONDS
     for one in weather_cells(block):
-        yield one, one.path_share_in_cell(place, line, time_s)
+        yield one, one.entry_and_exit_shares(place, line, time_s)
 
 
 def entry_and_exit_heights_m(cells: Cells, within: Within) -> tuple[FloatArray, FloatArray]:
     """Return the heights (m) at which each line of sight enters and leaves a weather cell."""
-    own_m = cells.of_row("own_alt_m")
+    own_m = cells.field_at_rows("own_alt_m")
     climb_m = cells.alt_m - own_m
     return own_m + within.enters * climb_m, own_m + within.leaves * climb_m

@@ -53,7 +53,7 @@ class Poses:
         self._mapping, self._size = tuple(mapping), state_size
         north, east, down = pose.position_m
         self._offset = np.stack([east, north, -down])
-        self._angles = euler_angles_rad(pose.to_body)
+        self._angles = roll_pitch_yaw_rad(pose.to_body)
         moves = np.full_like(pose.position_m, np.nan)
         if pose.velocity_m_s is not None:
             moves = pose.velocity_m_s
@@ -147,7 +147,7 @@ def make_detections(
 _UPRIGHT = 1e-9
 
 
-def euler_angles_rad(to_body: FloatArray) -> FloatArray:
+def roll_pitch_yaw_rad(to_body: FloatArray) -> FloatArray:
     """Return (roll, pitch, yaw) (3, n), rad, as Stone Soup's, of NED-to-body matrices (3, 3, n)."""
     # Columns along east, north, up; rows along nose, left wing, roof.
     turned = to_body[:, [1, 0, 2]] * np.array([1.0, 1.0, -1.0])[np.newaxis, :, np.newaxis]

@@ -24,7 +24,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.message import offsets_from_entry_rows
-from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, load_named
+from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, import_named_object
 from dsa_des.block.source_file import absolute_type_name
 from dsa_des.block.wake import Wake
 from dsa_des.time.randomness import key_of
@@ -132,7 +132,7 @@ class StoneSoupTracker(Component):
     def _build_tracker(self) -> Any:
         name = self.p.builder
         try:
-            build = load_named(name, f"blocks.{self.name}.builder")
+            build = import_named_object(name, f"blocks.{self.name}.builder")
         except NotAllowed:
             return None  # `check --no-import` runs nothing
         except NotImportable as error:

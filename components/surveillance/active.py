@@ -15,13 +15,13 @@ from components.messages.detections import (
     LastingError,
     LastingPart,
     SensorOffer,
-    report_interval_promises,
+    range_and_report_interval_pairs,
 )
 from components.messages.reach import EVALUATE, Reach
-from components.navigation.errors import navigation_noise_deviations
+from components.navigation.errors import position_and_attitude_deviations
 from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look
-from components.sensor.parameters import check_elevations
+from components.sensor.parameters import check_field_of_view_elevations
 from components.surveillance.altimetry import altimetry_variance_ft2
 from components.surveillance.believed_line import (
     OwnBelief,
@@ -75,9 +75,9 @@ class ActiveParameters(CooperativeParameters):
 
     may_change: ClassVar[tuple[str, ...]] = ("mode_s_in_1_s", "mode_c_in_1_s")
 
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
-        default=(-15.0, 20.0), description="Elevations at which answers come, deg."
-    )
+    elevation_deg: Annotated[
+        tuple[float, float], AfterValidator(check_field_of_view_elevations)
+    ] = Field(default=(-15.0, 20.0), description="Elevations at which answers come, deg.")
     replies: Literal["certain", "rounds"] = Field(
         default="rounds",
         description="Whether all that are asked answer, or each with a probability in ten rounds "
@@ -202,7 +202,7 @@ class Active(CooperativeSensor):
         return replace(
             offer, azimuth_variance_rad2=None, elevation_variance_rad2=None,
             range_variance_m2=None, lasting=lasting if self._errs else {}, unstated_across_m2=0.0,
-            promises=report_interval_promises(
+            promises=range_and_report_interval_pairs(
                 period_s, [(math.inf, every * period_s)] if every > 1 else ()
             ),
             tells=self._errs, told_errors=ERRORS_OF_REPLIES if self._errs else (),
@@ -242,14 +242,14 @@ class Active(CooperativeSensor):
             detected[asked] = self._has_recent_answer(cells, asked, probability[asked], instant_ns)
         answered = np.flatnonzero(detected)
         now = self.reported_altitude_m(cells, answered, cells.alt_m[answered])
-        detected[answered] = placed = self.has_position(cells, answered, now)
+        detected[answered] = placed = self.has_position_counting_others(cells, answered, now)
         answered, now = answered[placed], now[placed]
         extras = empty_report_columns(len(cells))
         equipage, craft = cells.roster.equipage, cells.equipage_rows[answered]
         extras["address"][answered] = np.where(equipage.mode_s[craft], equipage.address[craft], -1)
         extras["reported_alt_m"][answered] = now
         extras["reported_s"][answered] = cells.state_ns[answered] / NANOSECONDS
-        detected = self.is_not_excluded_by_address(cells, detected, extras["address"])
+        detected = self.is_heard_and_not_excluded(cells, detected, extras["address"])
         if len(answered):
             extras["reported_climb_m_s"][answered] = self._reported_climb_m_s(cells, answered, now)
         return Look(detected, probability, extras)
@@ -272,7 +272,7 @@ class Active(CooperativeSensor):
             since_s = (cells.scan[rest] + turn[~due]) % every * period_s
             ranges, known = [], np.ones(len(rest), dtype=bool)
             for ago_s in (since_s, since_s + every * period_s):
-                then = cells.seen_at(rest, -ago_s)
+                then = cells.relative_target_fields_ahead(rest, -ago_s)
                 instant_ns = cells.state_ns[rest] - np.rint(ago_s * NANOSECONDS).astype(np.int64)
                 known &= self._has_answered_at(cells, rest, then, instant_ns)
                 ranges.append(self._add_range_errors(cells, rest, then["range_m"], instant_ns))
@@ -283,7 +283,9 @@ class Active(CooperativeSensor):
     def _has_answered_at(
         self, cells: Cells, which: AnyArray, then: Any, instant_ns: IntArray
     ) -> BoolArray:
-        """Return which cells answered at an earlier instant, with positions `then` (mask)."""
+        """Return a mask over chosen cells: True where the aircraft, at positions `then`, answered
+        at that instant.
+        """
         azimuth, elevation = then["body_azimuth_rad"], then["body_elevation_rad"]
         there = then["present"] & (instant_ns >= 0)
         hidden = then.get("hidden")
@@ -319,7 +321,7 @@ class Active(CooperativeSensor):
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
         """Return the altitudes that cells' transponders report for true altitudes, m."""
-        step_ft = self._nominal_step_ft(cells, which) if self._errs else 0.0
+        step_ft = self._nominal_altitude_step_ft(cells, which) if self._errs else 0.0
         transponders = Transponders.from_cells(cells, which)
         altitude_m = self.pressure_altitude_m(altitude_m)
         return (
@@ -331,7 +333,7 @@ class Active(CooperativeSensor):
         self, cells: Cells, detected: AnyArray, now_m: FloatArray
     ) -> FloatArray:
         """Return the reported mean climb over the last 5 s, m/s; NaN without a report 5 s ago."""
-        then = cells.seen_at(detected, np.full(len(detected), -CLIMB_OVER_S))
+        then = cells.relative_target_fields_ahead(detected, np.full(len(detected), -CLIMB_OVER_S))
         before_m = self.reported_altitude_m(cells, detected, then["alt_m"])
         known = then["present"] & (cells.state_ns[detected] >= CLIMB_OVER_S * NANOSECONDS)
         return np.where(known, (now_m - before_m) / CLIMB_OVER_S, np.nan)
@@ -378,7 +380,7 @@ class Active(CooperativeSensor):
         azimuth, elevation, _ = ned_to_azimuth_elevation_range(own, ned)
         variances = (np.full(len(detected), _LEAST_M2),) * 3
         if self._errs:
-            position_m, attitude_rad = navigation_noise_deviations(self.context)
+            position_m, attitude_rad = position_and_attitude_deviations(self.context)
             variances = position_variances_of_replies_m2(
                 ned, deviation**2 + attitude_rad[0] ** 2, max(position_m[:2]) ** 2, altitude,
                 self._altitude_step_ft(cells, detected, altitude),
@@ -399,7 +401,7 @@ class Active(CooperativeSensor):
         """
         none = np.zeros(len(detected))
         mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[detected]]
-        position_m, attitude_rad = navigation_noise_deviations(self.context)
+        position_m, attitude_rad = position_and_attitude_deviations(self.context)
         own = own_velocity(cells, detected)
         altimetry_ft2 = altimetry_variance_ft2(altitude_m / FOOT_M)
         step_ft = self._altitude_step_ft(cells, detected, altitude_m)
@@ -418,8 +420,8 @@ class Active(CooperativeSensor):
     def _altitude_step_ft(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
-        return altitude_step_ft(altitude_m / FOOT_M, self._nominal_step_ft(cells, which))
+        return altitude_step_ft(altitude_m / FOOT_M, self._nominal_altitude_step_ft(cells, which))
 
-    def _nominal_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
+    def _nominal_altitude_step_ft(self, cells: Cells, which: AnyArray) -> FloatArray:
         mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[which]]
         return np.where(mode_s, float(self.p.mode_s_step_ft), 100.0)

@@ -13,16 +13,16 @@ from pydantic import Field, model_validator
 from components.aircraft.known_targets import offered_rosters
 from components.geometry import POSITION_FIELDS, line_of_sight_ned
 from components.messages.columns import OWN_VELOCITY, TOLD
-from components.messages.detections import Detections, SensorOffer, report_interval_promises
+from components.messages.detections import Detections, SensorOffer, range_and_report_interval_pairs
 from components.messages.reach import Reach
-from components.navigation.errors import displaced_position
+from components.navigation.errors import displaced_lat_lon_alt
 from components.sensor.ladder_values import make_cell_measure
 from components.sensor.look import Cells, Look
 from components.surveillance.believed_line import (
     OwnBelief,
     line_of_sight_variances,
+    ned_from_believed_position_m,
     ned_to_azimuth_elevation_range,
-    relative_ned,
 )
 from components.surveillance.broadcast import (
     Broadcasts,
@@ -35,7 +35,7 @@ from components.surveillance.cooperative import (
     CooperativeParameters,
     CooperativeSensor,
     own_velocity,
-    velocity_of,
+    velocity_ned_from_positions,
 )
 from components.surveillance.reception import (
     AIRCRAFT_AROUND,
@@ -49,13 +49,13 @@ from components.surveillance.squitter_clock import SHORTEST_S, SquitterClocks
 from components.surveillance.stated_errors import (
     LATE,
     StatedByAircraft,
-    errors_of_broadcast,
-    lasting_errors,
+    lasting_position_errors,
+    told_errors_of_broadcast,
 )
 from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.wake import Wake
-from dsa_des.time.clock import NANOSECONDS, nanosecond_of
+from dsa_des.time.clock import NANOSECONDS, ticks_to_nanoseconds
 
 #: Longest time that a message counts for: nobody is reported by older ones.
 LONGEST_S = 5.0
@@ -132,13 +132,13 @@ class AdsBParameters(CooperativeParameters):
         return replace(reach, range_max_m=LAWS[self.reception][1])
 
 
-def _position_errors(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
+def _reported_position_errors_m(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
     """Return how far reported positions lie north and east of the aircraft's true positions at each
     look, m, if every message is received.
     """
     receiver.law = LAWS["certain"][0]
     look = receiver.look(cells)
-    here = cells.seen_at(np.arange(len(cells)), np.zeros(len(cells)))
+    here = cells.relative_target_fields_ahead(np.arange(len(cells)), np.zeros(len(cells)))
     said = [look.extras[f"reported_{name}"] for name in POSITION_FIELDS]
     away = line_of_sight_ned(
         *(here[f"target_{name}"] for name in POSITION_FIELDS), *said, validate=False
@@ -172,7 +172,7 @@ ERRORS = Ladder(
     ),
     "gauss_markov",
     (Quantity("north", "m"), Quantity("east", "m")),
-    make_cell_measure(_position_errors),
+    make_cell_measure(_reported_position_errors_m),
 )  # fmt: skip
 
 
@@ -217,15 +217,15 @@ class AdsB(CooperativeSensor):
         self._broadcasts = Broadcasts(streams, parameters.position_errors, parameters.compact)
 
     @property
-    def _is_geometric(self) -> bool:
+    def _is_height_geometric(self) -> bool:
         return bool(self.p.heights == "geometric")
 
     def offer(self, port: str) -> Any:
         """Return the sensor's declaration: range rates, no fixed variances, lasting errors."""
         offer: SensorOffer = super().offer(port)
         errs = self.p.position_errors != "none" or self.p.compact or self.p.pressure_deviation_m
-        model = self.p.position_errors, self._is_geometric
-        told = errors_of_broadcast(*model) if errs else ()
+        model = self.p.position_errors, self._is_height_geometric
+        told = told_errors_of_broadcast(*model) if errs else ()
         # Of targets that may be anything some may be late.
         late = [
             (one.equipage.uncompensated_latency_s > 0.0).any()
@@ -236,23 +236,23 @@ class AdsB(CooperativeSensor):
         return replace(
             offer, measures_range_rate=True, azimuth_variance_rad2=None,
             elevation_variance_rad2=None, range_variance_m2=None, range_rate_variance_m2_s2=None,
-            lasting=lasting_errors(*model), unstated_across_m2=0.0,
-            promises=report_interval_promises(
+            lasting=lasting_position_errors(*model), unstated_across_m2=0.0,
+            promises=range_and_report_interval_pairs(
                 float(1 / self.p.scan_rate_hz), reception_time_steps(self.law, far_m)
             ),
             tells=True, told_errors=told,
         )  # fmt: skip
 
     @property
-    def steps(self) -> dict[str, float]:
+    def grid_step_by_quantity(self) -> dict[str, float]:
         """Grid steps of quantities as in other sensors, but 0 (no rounding) for range rate."""
-        return {**super().steps, "range_rate": 0.0}
+        return {**super().grid_step_by_quantity, "range_rate": 0.0}
 
     def cells(self, targets: Any, rows: IntArray, wake: Wake) -> tuple[Cells, Any]:
         """Return cells and reasons as every sensor does, and remember the instant of the scan
         before each, from which on messages count.
         """
-        self._before_ns = nanosecond_of(wake.previous_scan_tick, wake.ticks_per_s)
+        self._before_ns = ticks_to_nanoseconds(wake.previous_scan_tick, wake.ticks_per_s)
         return super().cells(targets, rows, wake)
 
     def look(self, cells: Cells) -> Look:
@@ -262,25 +262,27 @@ class AdsB(CooperativeSensor):
         extras = empty_report_columns(len(cells))
         moves = np.full((3, len(cells)), np.nan)
         sends = np.flatnonzero(cells.roster.ever_broadcasts[cells.craft])
-        reported, number, sent_ns = self._newest_received_message("position", cells, sends)
+        reported, number, sent_ns = self._received_cells_numbers_sent_ns("position", cells, sends)
         detected = np.zeros(len(cells), dtype=bool)
         detected[reported] = True
         if len(reported):
             self._fill_report_columns(cells, reported, number, sent_ns, extras)
-            taken = extras["reported_height_m" if self._is_geometric else "reported_alt_m"]
-            placed = self.has_position(cells, reported, taken[reported])
+            taken = extras["reported_height_m" if self._is_height_geometric else "reported_alt_m"]
+            placed = self.has_position_counting_others(cells, reported, taken[reported])
             detected[reported], reported = placed, reported[placed]
             moves[:, reported] = own_velocity(cells, reported)
-            detected = self.is_not_excluded_by_address(cells, detected, extras["address"])
+            detected = self.is_heard_and_not_excluded(cells, detected, extras["address"])
         signal = {f"own_{axis}": moves[i] for i, axis in enumerate(("north", "east", "down"))}
         self._rows = cells.row, moves
         confidence = np.where(detected, extras["nacp"], 0.0)
         return Look(detected, confidence, extras, signal=signal)
 
-    def _newest_received_message(
+    def _received_cells_numbers_sent_ns(
         self, kind: str, cells: Cells, asked: IntArray
     ) -> tuple[IntArray, IntArray, IntArray]:
-        """Return cells with such a message, and the newest's number and sending instant, ns."""
+        """Return indices of cells with a received message, and its number and sending instant (ns),
+        the newest.
+        """
         none = np.zeros(0, dtype=np.int64)
         if not len(asked):
             return none, none, none
@@ -300,7 +302,7 @@ class AdsB(CooperativeSensor):
         if not len(row):
             return none, none, none
         ahead_s = (sent_ns[row, column] - now_ns[row]) / NANOSECONDS
-        then = cells.seen_at(asked[row], ahead_s)
+        then = cells.relative_target_fields_ahead(asked[row], ahead_s)
         stream = self._received[kind].of_runs(senders.run[row], sent_ns[row, column])
         drawn = stream.uniform(senders.keys[row], number[row, column])
         came = then["present"] & (drawn < self.law(then["range_m"]))
@@ -312,8 +314,9 @@ class AdsB(CooperativeSensor):
         return asked[some], number[some, newest], sent_ns[some, newest]
 
     def _max_message_age_ns(self, kind: str, cells: Cells, asked: IntArray) -> IntArray:
-        """Return the oldest age at which a message still counts, ns: for positions the time since
-        the last scan, for velocities a fixed age.
+        """Return the oldest age, ns, at which a message still counts, for each cell of the indices
+        `asked`: of positions the time since the last scan, at most `LONGEST_S`, of velocities a
+        fixed age.
         """
         if kind == "velocity":
             return np.full(len(asked), round(self.p.velocity_age_s * NANOSECONDS))
@@ -331,18 +334,18 @@ class AdsB(CooperativeSensor):
     ) -> None:
         """Fill cells' report columns in place: decoded position, velocity, quality categories."""
         equipage, senders = cells.roster.equipage, Transponders.from_cells(cells, reported, sent_ns)
-        sent = self._states_when_sent(cells, reported, number, sent_ns)
+        sent = self._true_states_when_sent(cells, reported, number, sent_ns)
         position = self._broadcasts.broadcast_position(equipage, senders, sent)
         for name, values in zip(POSITION_FIELDS, position, strict=True):
             extras[f"reported_{name}"][reported] = values
         extras["reported_s"][reported] = sent_ns / NANOSECONDS
         for name in ("address", "nacp", "nic"):
             extras[name][reported] = getattr(equipage, name)[senders.craft]
-        moving, number, sent_ns = self._newest_received_message("velocity", cells, reported)
+        moving, number, sent_ns = self._received_cells_numbers_sent_ns("velocity", cells, reported)
         if not len(moving):
             return
         senders = Transponders.from_cells(cells, moving, sent_ns)
-        sent = self._states_when_sent(cells, moving, number, sent_ns)
+        sent = self._true_states_when_sent(cells, moving, number, sent_ns)
         velocity = self._broadcasts.broadcast_velocity(equipage, senders, sent)
         for axis, values in zip(("north", "east", "climb"), velocity, strict=True):
             extras[f"reported_{axis}_m_s"][moving] = values
@@ -351,7 +354,7 @@ class AdsB(CooperativeSensor):
         extras["reported_height_m"][moving] = extras["reported_alt_m"][moving] + above_m
         extras["nacv"][moving] = equipage.nacv[senders.craft]
 
-    def _states_when_sent(
+    def _true_states_when_sent(
         self, cells: Cells, which: IntArray, number: IntArray, sent_ns: IntArray
     ) -> Sent:
         """Return aircraft's true positions and velocities when message content was measured.
@@ -364,14 +367,14 @@ class AdsB(CooperativeSensor):
         ahead_s = (instant_ns - cells.state_ns[which]) / NANOSECONDS
         back_s = np.zeros(len(which))
         if latency_s.any():
-            known = cells.seen_at(which, ahead_s)["present"]
+            known = cells.relative_target_fields_ahead(which, ahead_s)["present"]
             back_s = np.where(known, 0.0, latency_s)
             ahead_s = ahead_s + back_s
-        then = cells.seen_at(which, ahead_s)
-        velocity = velocity_of(cells, which, ahead_s, then, "target")
+        then = cells.relative_target_fields_ahead(which, ahead_s)
+        velocity = velocity_ned_from_positions(cells, which, ahead_s, then, "target")
         position = [then[f"target_{name}"] for name in POSITION_FIELDS]
         if back_s.any():
-            before = displaced_position(*position, *(-velocity * back_s))
+            before = displaced_lat_lon_alt(*position, *(-velocity * back_s))
             position = [np.where(back_s > 0.0, b, p) for b, p in zip(before, position, strict=True)]
         velocity[2] = -velocity[2]
         lat, lon, height = position
@@ -397,16 +400,20 @@ class AdsB(CooperativeSensor):
         age_s = now_s - said["reported_s"]
         lat, lon, altitude = (said[f"reported_{name}"] for name in POSITION_FIELDS)
         height = said["reported_height_m"]
-        if not self._is_geometric:
+        if not self._is_height_geometric:
             height = self.heights_from_altitudes_m(cells, detected, altitude)
         position = [lat, lon, height]
         velocity = velocity_in_axes_of_later_position(
             position, velocity, said["reported_s"] - said["velocity_s"]
         )
         carried = np.nan_to_num(velocity)
-        ned = relative_ned(own, *displaced_position(*position, *(carried * age_s)))
+        ned = ned_from_believed_position_m(
+            own, *displaced_lat_lon_alt(*position, *(carried * age_s))
+        )
         # Its velocity is in its own axes, which are turned against ours.
-        ahead = relative_ned(own, *displaced_position(*position, *(carried * (age_s + STEP_S))))
+        ahead = ned_from_believed_position_m(
+            own, *displaced_lat_lon_alt(*position, *(carried * (age_s + STEP_S)))
+        )
         moving = np.where(np.isnan(velocity), np.nan, (ahead - ned) / STEP_S)
         azimuth, elevation, distance = ned_to_azimuth_elevation_range(own, ned)
         sent_ns = np.rint(said["reported_s"] * NANOSECONDS).astype(np.int64)
@@ -414,9 +421,10 @@ class AdsB(CooperativeSensor):
         stated = StatedByAircraft(
             roster.equipage, roster.equipage_rows(cells.craft[detected], sent_ns), said,
             errs=self.p.position_errors != "none", rounds=self.p.compact,
-            pressure_deviation_m=self.p.pressure_deviation_m, is_geometric=self._is_geometric,
+            pressure_deviation_m=self.p.pressure_deviation_m,
+            is_geometric=self._is_height_geometric,
         )  # fmt: skip
-        late_m = stated.late_s * np.nan_to_num(moving)
+        late_m = stated.position_lag_s * np.nan_to_num(moving)
         variances = line_of_sight_variances(own, ned, stated.position_variances_m2(age_s), late_m)
         moves = np.stack(
             [look.signal[f"own_{axis}"][detected] for axis in ("north", "east", "down")]
@@ -426,7 +434,7 @@ class AdsB(CooperativeSensor):
             **variances,
             "range_rate_m_s": rate,
             "range_rate_variance_m2_s2": np.where(
-                np.isnan(rate), np.nan, stated.speed_variance_m2_s2
+                np.isnan(rate), np.nan, stated.velocity_axis_variance_m2_s2
             ),
             "told_by_target": stated.velocities_and_errors(
                 moving, now_s - said["velocity_s"], age_s

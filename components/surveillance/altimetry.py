@@ -15,7 +15,7 @@ OTHER_FT = np.array([60.0, 60.0, 69.0, 87.0, 101.0, 101.0])
 SHARE_OF_BETTER = np.array([0.391, 0.320, 0.345, 0.610, 0.610, 0.610])
 
 
-def standard_laplace(uniform: FloatArray) -> FloatArray:
+def laplace_draws_from_uniform(uniform: FloatArray) -> FloatArray:
     """Return Laplace draws (mean 0, scale 1), one for each uniform draw in [0, 1)."""
     # The upper half is the mirrored lower one, and no draw is infinite.
     off = uniform - 0.5
@@ -39,7 +39,9 @@ def altimetry_error_ft(
 
 
 def altimetry_variance_ft2(altitude_ft: FloatArray) -> FloatArray:
-    """Return altimetry error variances, ft², at altitudes, over better and other altimeters."""
+    """Return the altimetry error variance, ft², at altitudes, averaged over better and other
+    altimeters.
+    """
     layer = np.searchsorted(LAYER_TOPS_FT, altitude_ft, side="left")
     share = SHARE_OF_BETTER[layer]
     return np.asarray(2.0 * (share * BETTER_FT[layer] ** 2 + (1.0 - share) * OTHER_FT[layer] ** 2))

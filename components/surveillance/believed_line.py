@@ -29,7 +29,7 @@ class OwnBelief:
     @classmethod
     def from_cells(cls, cells: Cells, which: IntArray) -> OwnBelief:
         """Return the position and attitude that the ownship believes at chosen cells' scans."""
-        return cls(*(cells.own_belief(name)[which] for name in cls.__annotations__))
+        return cls(*(cells.believed_pose_component(name)[which] for name in cls.__annotations__))
 
     @property
     def attitude(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -37,7 +37,7 @@ class OwnBelief:
         return self.yaw_rad, self.pitch_rad, self.roll_rad
 
 
-def relative_ned(
+def ned_from_believed_position_m(
     own: OwnBelief, lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray
 ) -> FloatArray:
     """Return positions relative to the believed own one, along north, east, down, (3, n), m."""

@@ -13,9 +13,9 @@ import numpy.typing as npt
 from components.aircraft.equipage import Equipage
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
 from components.geometry import NEAR_A_POLE_DEG, north_east_parts, rotate_to_meridian
-from components.navigation.errors import displaced_position
+from components.navigation.errors import displaced_lat_lon_alt
 from components.sensor.look import Cells
-from components.surveillance.altimetry import altimetry_error_ft, standard_laplace
+from components.surveillance.altimetry import altimetry_error_ft, laplace_draws_from_uniform
 from components.surveillance.compact_position import decode_near, encode
 from components.surveillance.extended_squitter import (
     quantised_altitude_ft,
@@ -80,7 +80,9 @@ class Altimeters:
             stream = self._stream.of_runs(transponders.run)
             first = np.zeros(len(transponders.run), dtype=np.int64)
             laplace, kind = (stream.uniform(transponders.keys, first, draw) for draw in (0, 1))
-            altitude = altitude + altimetry_error_ft(altitude, standard_laplace(laplace), kind)
+            altitude = altitude + altimetry_error_ft(
+                altitude, laplace_draws_from_uniform(laplace), kind
+            )
         step = np.broadcast_to(np.asarray(step_ft, np.float64), altitude.shape)
         rounded = quantised_altitude_ft(altitude, np.where(step > 0.0, step, 1.0))
         return np.where(step > 0.0, rounded, altitude)
@@ -152,7 +154,7 @@ class Broadcasts:
         if self._errors == "none":
             return np.zeros(len(message))
         uniform = self._climbs.of_runs(transponders.run).uniform(transponders.keys, message)
-        return CLIMB_SCALE_M_S * standard_laplace(uniform)
+        return CLIMB_SCALE_M_S * laplace_draws_from_uniform(uniform)
 
     def broadcast_height_difference_m(
         self, equipage: Equipage, transponders: Transponders, sent: Sent
@@ -212,7 +214,7 @@ class Broadcasts:
             sent.instant_ns[which], *true,
         )  # fmt: skip
         none = np.zeros_like(errors[0])
-        lat, lon, _ = displaced_position(*true, sent.alt_m[which], *errors, none)
+        lat, lon, _ = displaced_lat_lon_alt(*true, sent.alt_m[which], *errors, none)
         return rotate_to_meridian(moved, true, (lat, lon))
 
     def broadcast_position(
@@ -233,7 +235,7 @@ class Broadcasts:
         if ahead_s.any():
             moved = self.broadcast_velocity(equipage, transponders, sent) * ahead_s
             north, east, up = north + moved[0], east + moved[1], up + moved[2]
-        lat, lon, _ = displaced_position(
+        lat, lon, _ = displaced_lat_lon_alt(
             sent.lat_deg, sent.lon_deg, sent.alt_m, north, east, np.zeros_like(north)
         )
         step_ft, errs = 25.0 if self._quantised else 0.0, self._errors != "none"
@@ -257,6 +259,6 @@ def velocity_in_axes_of_later_position(
     turned = north_east_down
     for _ in range(3):
         back = np.nan_to_num(turned * -later_s)
-        lat, lon, _ = displaced_position(*position, *back)
+        lat, lon, _ = displaced_lat_lon_alt(*position, *back)
         turned = rotate_to_meridian(north_east_down, (lat, lon), (position[0], position[1]))
     return turned

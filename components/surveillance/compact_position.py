@@ -81,7 +81,7 @@ def decode_near(
     return lat, _wrap_longitude(lon)
 
 
-def decode_pair(
+def decode_newer_of_pair(
     even: tuple[IntArray, IntArray], odd: tuple[IntArray, IntArray], odd_is_newer: npt.ArrayLike
 ) -> tuple[FloatArray, FloatArray]:
     """Return the latitude and longitude (deg) of the newer of an even and an odd CPR report.

@@ -21,7 +21,7 @@ from components.surveillance.reports import CooperativeReports
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Output
 from dsa_des.errors import Disagreements, did_you_mean
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 
 #: Half of the time between positions that a velocity is of; a power of two.
 STEP_S = 1.0 / 64.0
@@ -125,10 +125,10 @@ class CooperativeSensor(Sensor):
         """
         if self.p.heights == "reported":
             return altitude_m
-        own_m = self.pressure_altitude_m(cells.of_row("own_alt_m")[which])
-        return altitude_m - (own_m - cells.own_belief("alt_m")[which])
+        own_m = self.pressure_altitude_m(cells.field_at_rows("own_alt_m")[which])
+        return altitude_m - (own_m - cells.believed_pose_component("alt_m")[which])
 
-    def _note_pressure_heights(self) -> list[str]:
+    def _pressure_height_notes(self) -> list[str]:
         """Return a sentence on the error of pressure altitudes that are used as heights."""
         if self._air is None or self.p.heights == "geometric":
             return []
@@ -152,7 +152,7 @@ class CooperativeSensor(Sensor):
         """
         rosters = offered_rosters(self.context)
         heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
-        said = [*super().warnings(), *self._note_pressure_heights()]
+        said = [*super().warnings(), *self._pressure_height_notes()]
         if not rosters or any(heard):
             return said
         needed = " or ".join(self.hears_of)
@@ -174,7 +174,7 @@ class CooperativeSensor(Sensor):
             if name not in names:
                 raise ValueError(f"leaves_out: there is no {name!r}{did_you_mean(name, names)}")
 
-    def is_not_excluded_by_address(
+    def is_heard_and_not_excluded(
         self, cells: Cells, heard: BoolArray, address: IntArray
     ) -> BoolArray:
         """Return a mask over cells: True where a message was received and the address is not one of
@@ -189,14 +189,17 @@ class CooperativeSensor(Sensor):
             heard = heard & (address != roster.equipage.address[craft])
         return heard
 
-    def has_position(self, cells: Cells, heard: IntArray, altitude_m: FloatArray) -> BoolArray:
-        """Return which received cells have an altitude, so a position; count the others (mask).
+    def has_position_counting_others(
+        self, cells: Cells, heard: IntArray, altitude_m: FloatArray
+    ) -> BoolArray:
+        """Return a mask over received cells: True where the altitude is known; others are added to
+        a count.
 
         An altitude that no code has is not available (NaN).
         """
         there = np.isfinite(altitude_m)
         run = cells.run[heard]
-        self._unplaced = add_cases(self._unplaced, run[~there], run)
+        self._unplaced = counts_with_cases_added(self._unplaced, run[~there], run)
         return there
 
     @cached_property
@@ -207,10 +210,12 @@ class CooperativeSensor(Sensor):
 def own_velocity(cells: Cells, which: IntArray) -> FloatArray:
     """Return the ownship's true velocity (north, east, down), (3, n), m/s, at cells' instants."""
     now = np.zeros(len(which))
-    return velocity_of(cells, which, now, cells.seen_at(which, now), "own")
+    return velocity_ned_from_positions(
+        cells, which, now, cells.relative_target_fields_ahead(which, now), "own"
+    )
 
 
-def velocity_of(
+def velocity_ned_from_positions(
     cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
 ) -> FloatArray:
     """Return the velocity along north, east and down, (3, n), m/s, of the ownship or the targets,
@@ -219,7 +224,7 @@ def velocity_of(
     positions = [here[f"{whose}_{name}"] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(which))
     for step_s in (-STEP_S, STEP_S):
-        then = cells.seen_at(which, ahead_s + step_s)
+        then = cells.relative_target_fields_ahead(which, ahead_s + step_s)
         there = then["present"]
         way = line_of_sight_ned(
             *positions, *(then[f"{whose}_{name}"] for name in POSITION_FIELDS), validate=False

@@ -14,8 +14,8 @@ from dsa_des.arrays.types import AnyArray, FloatArray, IntArray
 from dsa_des.block.component import ClockedParameters, Component, Input, Output
 from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
+from dsa_des.time.clock import ticks_to_nanoseconds
 from dsa_des.time.randomness import target_keys
 
 # Velocities are differences of positions so far apart, s; a power of two.
@@ -78,12 +78,12 @@ class PositionExchange(Component):
         states: TrafficStates | None = wake["states"]
         if states is None:
             return None
-        self._still = add_cases(
+        self._still = counts_with_cases_added(
             self._still, wake.run[: len(wake) if states.flights is None else 0], wake.run
         )
         if states.flights is None:
             return None
-        fixes = states.flights.compute_once(
+        fixes = states.flights.compute_if_arrays_changed(
             f"fixes {self.p.position_m} {self.p.velocity_mps}",
             (wake.ticks, wake.run, states.tick, states.columns, states.flights.known),
             lambda: self._velocities_and_fix_errors(wake, states),
@@ -92,7 +92,10 @@ class PositionExchange(Component):
             _split_viewer_from_others(part, _viewer_index(states)) for part in fixes
         )
         own, targets = _viewer_and_other_positions(states)
-        position, relative = _east_north_up_m(own[:, :, np.newaxis], targets), velocity - own_mps
+        position, relative = (
+            _displacement_east_north_up_m(own[:, :, np.newaxis], targets),
+            velocity - own_mps,
+        )
         for part, (mine, theirs) in zip((position, relative), errors, strict=True):
             part[:2] += theirs - mine
             part[2] += 0.0
@@ -151,11 +154,14 @@ class PositionExchange(Component):
         roster = roster if viewer < 0 else roster.seen_from(viewer)
         keys = np.append(target_keys((roster.own_name,)), roster.draw_keys_of(states.columns))
         keys = np.broadcast_to(keys, here.shape[1:])
-        return [_east_north_up_m(here, there) / _STEP_S, *self._fix_errors(wake, keys)]
+        return [
+            _displacement_east_north_up_m(here, there) / _STEP_S,
+            *self._position_and_velocity_errors(wake, keys),
+        ]
 
-    def _fix_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
+    def _position_and_velocity_errors(self, wake: Wake, keys: AnyArray) -> list[FloatArray]:
         """Return errors of position and of velocity, (2, rows, aircraft) each: east and north."""
-        instant_ns = nanosecond_of(wake.ticks, wake.ticks_per_s)
+        instant_ns = ticks_to_nanoseconds(wake.ticks, wake.ticks_per_s)
         run, shape = np.repeat(wake.run, keys.shape[1]), (2, *keys.shape)
         number = np.repeat(instant_ns, keys.shape[1])
         stream = self._errors.of_runs(run, number)
@@ -192,7 +198,7 @@ def _split_viewer_from_others(everybody: FloatArray, viewer: int) -> tuple[Float
     return everybody[:, :, viewer : viewer + 1].copy(), others
 
 
-def _east_north_up_m(here: FloatArray, there: FloatArray) -> FloatArray:
+def _displacement_east_north_up_m(here: FloatArray, there: FloatArray) -> FloatArray:
     """Return the displacement from positions to others, along the first's east, north, up, m."""
     north, east, down = line_of_sight_ned(*here, *there, validate=False)
     return np.stack(np.broadcast_arrays(east, north, -down))

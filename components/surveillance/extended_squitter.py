@@ -151,8 +151,8 @@ def position_messages(
     )  # fmt: skip
     steps = ((feet - LOWEST_FT) // ALTITUDE_STEP_FT).astype(np.int64)
     fine = (feet >= LOWEST_FT) & (feet <= HIGHEST_FT)
-    altitude = np.where(fine, (steps >> 4) << 5 | 1 << 4 | (steps & 15), _gillham(feet))
-    return _squitters(address, [
+    altitude = np.where(fine, (steps >> 4) << 5 | 1 << 4 | (steps & 15), _gillham_code_bits(feet))
+    return _assemble_squitters(address, [
         (_TYPE_CODES[category], 5), (0, 2), (_SUPPLEMENTS[category], 1), (altitude, 12), (0, 1),
         (odd, 1), (y, 17), (x, 17),
     ])  # fmt: skip
@@ -180,7 +180,7 @@ def velocity_messages(
         quantised_climb_ft_min(_check_between("climb_ft_min", climb_ft_min, -1e7, 1e7)),
         _check_between("nacv", nacv, 0, 4),
     )  # fmt: skip
-    return _squitters(address, [
+    return _assemble_squitters(address, [
         (_VELOCITY_TYPE, 5), (np.where(step == 1, 1, 2), 3), (0, 1), (0, 1), (category, 3),
         (east < 0, 1), (np.abs(east) / step + 1, 10),
         (north < 0, 1), (np.abs(north) / step + 1, 10),
@@ -215,7 +215,7 @@ def position_fields(messages: Bytes) -> PositionFields:
     )  # fmt: skip
 
 
-def velocity_fields(messages: Bytes) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
+def north_east_climb_nacv(messages: Bytes) -> tuple[FloatArray, FloatArray, FloatArray, IntArray]:
     """Return north and east in kt, vertical rate in ft/min and NACv of velocity messages."""
 
     step = np.where(_field(messages, 37, 3) == 2, float(_SUPERSONIC), 1.0)
@@ -233,7 +233,7 @@ def velocity_fields(messages: Bytes) -> tuple[FloatArray, FloatArray, FloatArray
 _OF_500, _OF_100 = (9, 11, 1, 3, 5, 6, 8, 10), (0, 2, 4)
 
 
-def _gillham(altitude_ft: FloatArray) -> IntArray:
+def _gillham_code_bits(altitude_ft: FloatArray) -> IntArray:
     """Return the 12 bits of altitudes on the grid of 100 ft: ICAO Annex 10, volume IV, appendix."""
     whole = np.clip(altitude_ft, GILLHAM_LOWEST_FT, GILLHAM_HIGHEST_FT).astype(np.int64) + 1300
     coarse = (whole - GILLHAM_STEP_FT) // 500
@@ -272,7 +272,7 @@ def _check_between(name: str, values: npt.ArrayLike, low: float, high: float) ->
     return array
 
 
-def _squitters(address: FloatArray, fields: list[tuple[npt.ArrayLike, int]]) -> Bytes:
+def _assemble_squitters(address: FloatArray, fields: list[tuple[npt.ArrayLike, int]]) -> Bytes:
     """Return messages of format 17, capability 5 (airborne), with their parity."""
     bits = np.zeros((address.size, _BITS), dtype=np.uint8)
     first = 0

@@ -62,7 +62,7 @@ def do_365_reception_probability(range_m: FloatArray) -> FloatArray:
     return np.where(range_m <= inner, near, np.where(range_m <= outer, far, 0.0))
 
 
-def time_to_receive_s(probability: FloatArray) -> FloatArray:
+def time_to_receive_95_percent_s(probability: FloatArray) -> FloatArray:
     """Return the time (s, at most 60) to receive a message with 95 %, for two messages a second."""
     missed = np.log1p(-np.clip(probability, 1e-9, 1.0 - 1e-9))
     messages = np.maximum(np.ceil(np.log(0.05) / missed - 1e-6), 1.0)
@@ -79,7 +79,7 @@ def reception_time_steps(
     ranges_m = np.array([np.inf])
     if np.isfinite(reach_m):
         ranges_m = np.linspace(0.0, reach_m, _PROMISED_RANGES + 1)[1:]
-    within_s = time_to_receive_s(law(ranges_m))
+    within_s = time_to_receive_95_percent_s(law(ranges_m))
     return list(zip(ranges_m.tolist(), within_s.tolist(), strict=True))
 
 

@@ -41,7 +41,9 @@ _UNKNOWN_M_S, _MANOEUVRE_M_S2 = 100.0, 1.0
 _LEAST_M2 = 1e-4
 
 
-def lasting_errors(position_errors: str, is_geometric: bool = False) -> dict[str, LastingError]:
+def lasting_position_errors(
+    position_errors: str, is_geometric: bool = False
+) -> dict[str, LastingError]:
     """Return, by quantity, ADS-B position errors that stay correlated; empty without errors."""
     if position_errors == "none":
         return {}
@@ -75,8 +77,10 @@ ERRORS_OF_REPLIES = (
 )
 
 
-def errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[ToldError, ...]:
-    """Return the errors that broadcasts state about themselves, with how long each lasts."""
+def told_errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[ToldError, ...]:
+    """Return the kinds of error that broadcasts state of themselves, with how long each stays
+    correlated.
+    """
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
     level = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
@@ -129,7 +133,7 @@ class StatedByAircraft:
     is_geometric: bool = False
 
     @property
-    def speed_variance_m2_s2(self) -> FloatArray:
+    def velocity_axis_variance_m2_s2(self) -> FloatArray:
         """Mean square error of the north and of the east velocity, m²/s², (n,)."""
         square = self.equipage.velocity_deviation_m_s[self.craft] ** 2
         speed = np.where(self.errs, square, _LEAST_M2)
@@ -152,8 +156,10 @@ class StatedByAircraft:
         return rounding
 
     @property
-    def late_s(self) -> FloatArray:
-        """Reported positions' lag along the reported velocity, s, (n,); 0 without velocity."""
+    def position_lag_s(self) -> FloatArray:
+        """Time, s, by which reported positions lag as latency is not compensated; 0 without
+        velocity.
+        """
         known = ~np.isnan(self.said["reported_north_m_s"])
         return np.where(known, self.equipage.uncompensated_latency_s[self.craft], 0.0)
 
@@ -171,7 +177,7 @@ class StatedByAircraft:
     def position_variances_m2(self, age_s: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return variances (m²) of extrapolated positions: two horizontal axes, then vertical.
 
-        What they are late by (`late_s`) is beside these.
+        What they are late by (`position_lag_s`) is beside these.
         """
         square = self.equipage.position_deviation_m[self.craft] ** 2
         level = np.where(self.errs, square, _LEAST_M2)
@@ -189,7 +195,7 @@ class StatedByAircraft:
         moving = ~np.isnan(self.said["reported_north_m_s"])
         level = (
             level
-            + np.where(moving, self.speed_variance_m2_s2, _UNKNOWN_M_S**2)
+            + np.where(moving, self.velocity_axis_variance_m2_s2, _UNKNOWN_M_S**2)
             * self.extrapolation_time_s(age_s) ** 2
         )
         return level, level, high
@@ -201,7 +207,12 @@ class StatedByAircraft:
         climb = 2.0 * CLIMB_SCALE_M_S**2 if self.errs else 0.0
         climb += (64.0 * FOOT_PER_MINUTE_M_S) ** 2 / 12.0 if self.rounds else 0.0
         none = np.zeros(len(age_s))
-        tells = (self.late_s > 0.0) | self.errs | self.rounds | (self.pressure_deviation_m > 0.0)
+        tells = (
+            (self.position_lag_s > 0.0)
+            | self.errs
+            | self.rounds
+            | (self.pressure_deviation_m > 0.0)
+        )
         carried_s, latency_s = self.extrapolation_time_s(age_s), self.equipage.latency_s[self.craft]
         # Where errors are stated, filters know how targets move on the way.
         turned = np.where(tells, 0.0, _MANOEUVRE_M_S2 * (velocity_age_s + latency_s)) ** 2
@@ -221,8 +232,8 @@ class StatedByAircraft:
             "height_deviation": np.sqrt(np.maximum(high - rounding_m2, 0.0)),
             "rounding_deviation": np.sqrt(rounding_m2),
             "climb_deviation": none + math.sqrt(climb),
-            "speed_deviation": np.sqrt(self.speed_variance_m2_s2),
-            "latency_deviation": self.late_s,
+            "speed_deviation": np.sqrt(self.velocity_axis_variance_m2_s2),
+            "latency_deviation": self.position_lag_s,
             "age_s": np.where(known, carried_s, 0.0),
             "velocity_age_s": np.where(known, velocity_age_s + latency_s, 0.0),
             "white_variance": white,

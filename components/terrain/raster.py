@@ -117,7 +117,7 @@ class ElevationRaster:
             f"{self.west_deg:.6g} to {self.east_deg:.6g}"
         )
 
-    def row_and_column(
+    def fractional_row_and_column(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return positions as fractional rows from the south and columns from the west."""
@@ -134,7 +134,7 @@ class ElevationRaster:
         where the position lies on the raster.
         """
         rows, columns = self.height_m.shape
-        v, u = self.row_and_column(lat_deg, lon_deg)
+        v, u = self.fractional_row_and_column(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)
         v, u = np.clip(v, 0.0, rows - 1), np.clip(u, 0.0, columns - 1)
         row = np.minimum(v.astype(np.int64), rows - 2)
@@ -256,7 +256,7 @@ def _read_hgt(path: Path, name: str) -> ElevationRaster:
         raise ValueError(
             f"{name}: the name of an .hgt file must say its south-west corner, as N45W076.hgt does"
         )
-    data = _unpack(path, name)
+    data = _content_of_file_or_archive(path, name)
     nodes = math.isqrt(len(data) // 2)
     refuse_many_nodes(name, nodes, nodes)
     if nodes < 2 or 2 * nodes * nodes != len(data):
@@ -272,7 +272,7 @@ def _read_hgt(path: Path, name: str) -> ElevationRaster:
     return ElevationRaster(south, west, step, step, height, name, filled)
 
 
-def _unpack(path: Path, name: str) -> bytes:
+def _content_of_file_or_archive(path: Path, name: str) -> bytes:
     """Return the content of a file, or of the one .hgt in an archive."""
     refuse_many_nodes(name, 1, path.stat().st_size // 2)
     data = path.read_bytes()

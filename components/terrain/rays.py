@@ -20,7 +20,7 @@ from components.geometry import (
     ECCENTRICITY_SQUARED,
     SEMI_MAJOR_AXIS_M,
     Vector,
-    local_axes,
+    east_north_up_axes,
 )
 from components.terrain.raster import ElevationRaster
 from dsa_des.arrays.types import FloatArray
@@ -93,7 +93,7 @@ def geodetic_lat_rad_lon_deg(x: FloatArray, y: FloatArray, z: FloatArray) -> Vec
 
 def earth_centred_xyz_m(lat_deg: FloatArray, lon_deg: FloatArray, alt_m: FloatArray) -> Vector:
     """Return Earth-centred x, y, z (m) of flat arrays of latitude, longitude (deg), height (m)."""
-    _, _, (ux, uy, uz) = local_axes(lat_deg, lon_deg)
+    _, _, (ux, uy, uz) = east_north_up_axes(lat_deg, lon_deg)
     n = SEMI_MAJOR_AXIS_M / np.sqrt(1.0 - ECCENTRICITY_SQUARED * uz * uz)
     level = n + alt_m
     return level * ux, level * uy, (n * (1.0 - ECCENTRICITY_SQUARED) + alt_m) * uz
@@ -215,8 +215,8 @@ def is_behind_terrain(
     slope times half their distance, and a ray can sink by its sag. Rays that come so near to the
     ground are looked at again, sixteen times as finely and where they cross rows and columns of
     nodes. In a cell the ground is a parabola along the ray, so that one may be taken for free
-    although ground stands in it up to `max_undetected_ground_m`, 0.0005 · `largest_height_step_m`
-    where nodes lie close; never for hidden where none does.
+    although ground stands in it up to `max_ground_above_clear_ray_m`, 0.0005 ·
+    `largest_height_step_m` where nodes lie close; never for hidden where none does.
     """
     rays = rays_between(own, other, refraction)
     first, last = rays.shares_possibly_below(raster.highest_m + offset_m)
@@ -234,8 +234,10 @@ def is_behind_terrain(
     return hidden
 
 
-def max_undetected_ground_m(raster: ElevationRaster) -> float:
-    """Return an upper bound, m, on how far ground may rise above a ray that tests as clear."""
+def max_ground_above_clear_ray_m(raster: ElevationRaster) -> float:
+    """Return an upper bound, m, of how far ground may rise above a ray that is judged to be clear
+    of it.
+    """
     # Second derivative 2 · twist, twist at most twice the largest step; an eighth of the squared
     # distance of points a thirty-second of a cell apart. The same of the Earth's curvature.
     return (
@@ -296,7 +298,7 @@ def _shares_of_grid_crossings(
     ends = []
     for side in (-0.5, 0.5):
         lat_rad, lon_deg, _ = rays.points_at_shares(share + side * piece, ray)
-        ends.append(raster.row_and_column(lat_rad * DEG_PER_RAD, lon_deg))
+        ends.append(raster.fractional_row_and_column(lat_rad * DEG_PER_RAD, lon_deg))
     shares = []
     for a, b in zip(*ends, strict=True):
         line = np.maximum(np.floor(a), np.floor(b))

@@ -13,7 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, finite, one_of, positive, unflatten
+from components.arguments.checks import (
+    broadcast_flat,
+    check_finite,
+    check_one_of,
+    check_positive,
+    unflatten,
+)
 
 _LN_2 = math.log(2.0)
 #: Impedance of free space over 2 pi, ohm: conductivity as the imaginary part of a permittivity.
@@ -44,8 +50,8 @@ def reflection_coefficient(grazing_rad: ArrayLike, permittivity: complex, polari
     (sin ψ - q) / (sin ψ + q) and (ε sin ψ - q) / (ε sin ψ + q), q = sqrt(ε - cos² ψ): -1 at ψ = 0,
     and of vertical polarisation 0 at Brewster's angle tan ψ = 1 / sqrt(ε) where ε is real.
     """
-    one_of("polarisation", polarisation, ("horizontal", "vertical", "circular", "slant"))
-    shape, (grazing,) = broadcast_flat(grazing_rad=finite("grazing_rad", grazing_rad))
+    check_one_of("polarisation", polarisation, ("horizontal", "vertical", "circular", "slant"))
+    shape, (grazing,) = broadcast_flat(grazing_rad=check_finite("grazing_rad", grazing_rad))
     sine = np.sin(grazing)
     root = np.sqrt(permittivity - np.cos(grazing) ** 2)
     horizontal = (sine - root) / (sine + root)
@@ -54,19 +60,19 @@ def reflection_coefficient(grazing_rad: ArrayLike, permittivity: complex, polari
     return unflatten(of.get(polarisation, 0.5 * (horizontal + vertical)), shape)
 
 
-def specular_field_factor(grazing_rad: ArrayLike, roughness_m: float, wavelength_m: float) -> Any:
+def roughness_field_factor(grazing_rad: ArrayLike, roughness_m: float, wavelength_m: float) -> Any:
     """Return exp(-g² / 2), g = 4 pi s sin ψ / λ: roughness's factor on the reflected field.
 
     s is the standard deviation of heights: W. S. Ament, "Toward a theory of reflection by a rough
     surface", Proc. IRE 41, 1953. By Rayleigh's criterion, g = pi / 2, it is 0.29.
     """
-    shape, (grazing,) = broadcast_flat(grazing_rad=finite("grazing_rad", grazing_rad))
+    shape, (grazing,) = broadcast_flat(grazing_rad=check_finite("grazing_rad", grazing_rad))
     g = (
         4.0
         * math.pi
         * roughness_m
         * np.sin(grazing)
-        / float(positive("wavelength_m", wavelength_m))
+        / float(check_positive("wavelength_m", wavelength_m))
     )
     with np.errstate(under="ignore"):
         return unflatten(np.exp(-0.5 * g * g), shape)
@@ -105,9 +111,9 @@ def two_ray_power_factor(
     d² / 17,000 km of the heights.
     """
     shape, (distance, own, target) = broadcast_flat(
-        range_m=positive("range_m", range_m),
-        own_height_m=finite("own_height_m", own_height_m),
-        target_height_m=finite("target_height_m", target_height_m),
+        range_m=check_positive("range_m", range_m),
+        own_height_m=check_finite("own_height_m", own_height_m),
+        target_height_m=check_finite("target_height_m", target_height_m),
     )
     product = np.maximum(own, 0.0) * np.maximum(target, 0.0)
     mirrored = np.sqrt(distance * distance + 4.0 * product)
@@ -115,7 +121,7 @@ def two_ray_power_factor(
     sine = np.clip((own + target) / mirrored, 0.0, 1.0)
     grazing = np.arcsin(sine)
     field = reflection_coefficient(grazing, permittivity, polarisation)
-    field = field * specular_field_factor(grazing, roughness_m, wavelength_m)
+    field = field * roughness_field_factor(grazing, roughness_m, wavelength_m)
     if elevation_beamwidth_rad:
         up = np.arcsin(np.clip((target - own) / distance, -1.0, 1.0))
         field = field * np.exp(-2.0 * _LN_2 * ((up + grazing) / elevation_beamwidth_rad) ** 2)

@@ -12,9 +12,9 @@ from components.optical.camera import Camera
 from components.optical.infrared_area import infrared_area
 from components.optical.signature import detection_range
 from components.optical.silhouette import visible_area
-from components.thesis.drawing import GREY, panels
+from components.thesis.drawing import GREY, panels_written_as_png
 from components.thesis.rows import Cells, Made, Row, calibrated, configured, predicted
-from components.thesis.scenes import aircraft, eo_camera, ir_camera, silhouette_areas
+from components.thesis.scenes import aircraft, eo_camera, ir_camera, silhouette_area_keywords
 from dsa_des.arrays.types import FloatArray
 from dsa_des.block.mark import BLUE, GREEN, ORANGE, SKY
 
@@ -73,7 +73,9 @@ def eo_detection_range_km(
 ) -> float:
     """Return the range (km) where a case's aircraft and geometry just reach the threshold."""
     heading, climb = math.radians(case.heading_deg), math.radians(case.climb_deg)
-    area_m2 = visible_area(heading, climb, 0.0, 0.0, **silhouette_areas(case.file), model=model)
+    area_m2 = visible_area(
+        heading, climb, 0.0, 0.0, **silhouette_area_keywords(case.file), model=model
+    )
     return float(camera_detection_range_km(camera, area_m2, aircraft(case.file).contrast, dynamic))
 
 
@@ -146,7 +148,7 @@ def eo_ranges(printed: Cells) -> Made:
             ("ours, thesis's eq. 9-13", BLUE, by_thesis),
             ("ours, exact projection", ORANGE, exact),
         ]
-        with panels(path, width_in=7.2, height_in=4.2) as (axes,):
+        with panels_written_as_png(path, width_in=7.2, height_in=4.2) as (axes,):
             for number, (label, colour, values) in enumerate(bars):
                 drawn = axes.bar(index + 0.2 * (number - 1.5), values, 0.19, color=colour,
                                  label=label)  # fmt: skip
@@ -189,7 +191,9 @@ def area_error(printed: Cells) -> Made:
     """Eq. 33-34: what an error of 20 % in the visible area does to the detection range."""
     camera = eo_camera()
     pixel = camera.pixel_azimuth_rad * camera.pixel_elevation_rad
-    front = {file: silhouette_areas(file)["front_m2"] for file in ("king_air", "boeing_787")}
+    front = {
+        file: silhouette_area_keywords(file)["front_m2"] for file in ("king_air", "boeing_787")
+    }
     near_km, far_km = (float(camera_detection_range_km(camera, area)) for area in front.values())
     root = "Range goes with the square root of the area."
     ranges = predicted(
@@ -231,7 +235,7 @@ def area_error(printed: Cells) -> Made:
 
     def draw(path: Path) -> None:
         _, longer, shorter = data.values()
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             axes.plot(at_km, longer, color=BLUE, label="area 20 % too large: range too long by")
             axes.plot(at_km, shorter, "--", color=ORANGE,
                       label="area 20 % too small: range too short by")  # fmt: skip
@@ -299,7 +303,9 @@ def ir_ranges_refined(printed: Cells) -> Made:
 
 def _ir_ranges_km(name: str) -> FloatArray:
     """Return the detection range of an aircraft file over relative heading, 0 to 180°, km."""
-    area_m2 = infrared_area(np.radians(HEADING_DEG), 0.0, 0.0, 0.0, **silhouette_areas(name, "ir"))
+    area_m2 = infrared_area(
+        np.radians(HEADING_DEG), 0.0, 0.0, 0.0, **silhouette_area_keywords(name, "ir")
+    )
     return np.asarray(camera_detection_range_km(ir_camera(), area_m2, aircraft(name).contrast_ir))
 
 
@@ -317,7 +323,7 @@ def _ir_ranges_result(
     ]
 
     def draw(path: Path) -> None:
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             for name, (label, colour) in IR_CLASSES.items():
                 axes.plot(HEADING_DEG, ranges[name], color=colour, label=label)
                 if before is not None:

@@ -26,7 +26,7 @@ RADAR, EO, IR, FUSION = (
 GREY = "#777777"
 
 
-def legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
+def draw_legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
     """Draw the legend of one pair of axes below all of them; `without` names an entry."""
     entries = zip(*axes.get_legend_handles_labels(), strict=True)
     shown = [entry for entry in entries if entry[1] != without]
@@ -34,7 +34,7 @@ def legend_below(axes: Any, columns: int = 4, *, without: str = "") -> None:
 
 
 @contextmanager
-def panels(
+def panels_written_as_png(
     path: Path,
     rows: int = 1,
     columns: int = 1,
@@ -81,17 +81,19 @@ def draw_map(axes: Any, run: SceneRun, *, fields_of_view: tuple[str, ...] = ()) 
     axes.set_ylabel("north (km)")
 
 
-def mark_detected_targets(
+def mark_true_target_positions(
     axes: Any, run: SceneRun, rows: dict[str, AnyArray], **style: Any
 ) -> None:
     """Plot each row's target on a map at its true position and time, for a recorded table."""
-    east, north = true_positions(run, rows)
+    east, north = true_target_positions_km(run, rows)
     defaults = {"linestyle": "none", "marker": "o", "markersize": 4.5, "fillstyle": "none",
                 "color": RADAR, "zorder": 2}  # fmt: skip
     axes.plot(east, north, **{**defaults, **style})
 
 
-def true_positions(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+def true_target_positions_km(
+    run: SceneRun, rows: dict[str, AnyArray]
+) -> tuple[FloatArray, FloatArray]:
     """Return the true east and north position in km of each row's target at the row's time."""
     east, north = np.empty(len(rows["time_s"])), np.empty(len(rows["time_s"]))
     for name in np.unique(rows["target"].astype(str)):
@@ -100,7 +102,7 @@ def true_positions(run: SceneRun, rows: dict[str, AnyArray]) -> tuple[FloatArray
     return east, north
 
 
-def reported_positions(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
+def reported_positions_km(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
     """Return the east and north positions in km that measured azimuth, elevation and range give for
     a level ownship heading north.
     """

@@ -11,15 +11,15 @@ from components.aircraft.aspect_tables import dbsm_to_m2
 from components.radar.detection import required_snr
 from components.radar.link_budget import LinkBudget, with_bandwidth
 from components.radar.swerling import SwerlingParameters
-from components.thesis.drawing import GREY, legend_below, panels
-from components.thesis.radar import CLASSES, pd_at
+from components.thesis.drawing import GREY, draw_legend_below, panels_written_as_png
+from components.thesis.radar import CLASSES, swerling1_pd_at_ranges
 from components.thesis.rows import Basis, Cells, Made, Row, calibrated, configured, predicted
 from components.thesis.scenes import (
     ThesisRecording,
     aircraft,
     load_config_scene,
     radar_parameters,
-    read_csv,
+    read_thesis_csv,
     run_replicas_of_scene,
 )
 from dsa_des.arrays.types import FloatArray
@@ -64,7 +64,9 @@ def pd_at_averages(printed: Cells) -> Made:
 
     def probabilities(bandwidth_hz: float) -> list[float]:
         chosen = with_bandwidth(budget, bandwidth_hz)
-        return [float(pd_at(sensor, chosen, dbsm, km)) for dbsm, km in CLASSES.values()]
+        return [
+            float(swerling1_pd_at_ranges(sensor, chosen, dbsm, km)) for dbsm, km in CLASSES.values()
+        ]
 
     pds = [printed[f"pd_{name}"].value for name in CLASSES]
 
@@ -81,7 +83,7 @@ def pd_at_averages(printed: Cells) -> Made:
         quantity = f"Pd of the {name} class at {km:.2f} km"
         rows.append(printed[f"pd_{name}"].compare(
             quantity, ours, "", "The last digits of both ranges and both Pd are allowed for.",
-            _basis_of_class_pd(name), tolerance=_rounding_error_of_pd(sensor, dbsm,
+            _basis_of_class_pd(name), tolerance=_pd_tolerance_by_rounding(sensor, dbsm,
             km)))  # fmt: skip
         off.append(printed[f"off_{name}"].compare(
             f"how far Pd of the {name} class is off 0.9 (§5.1.3)", 100.0 * abs(ours - 0.9), "%",
@@ -110,7 +112,7 @@ def pd_at_averages(printed: Cells) -> Made:
             (f"ours, {budget.bandwidth_hz:.0f} Hz (small class)", BLUE, by_small),
             (f"least squares, {fitted_hz:.0f} Hz", ORANGE, fitted),
         )
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             for step, (label, colour, values) in zip((-0.27, 0.0, 0.27), drawn, strict=True):
                 bars = axes.bar(index + step, values, 0.25, color=colour, label=label)
                 axes.bar_label(bars, fmt="%.4f", fontsize=8)
@@ -132,10 +134,15 @@ def pd_at_averages(printed: Cells) -> Made:
     return Made.with_figure(rows, "sec_4_1_3", caption, draw, data)
 
 
-def _rounding_error_of_pd(sensor: SwerlingParameters, rcs_dbsm: float, range_km: float) -> float:
+def _pd_tolerance_by_rounding(
+    sensor: SwerlingParameters, rcs_dbsm: float, range_km: float
+) -> float:
     """Return the tolerance of a printed Pd due to the rounding of printed ranges and Pd."""
     budget = sensor.link_budget()
-    near, far = (pd_at(sensor, budget, rcs_dbsm, range_km + step) for step in (-0.005, 0.005))
+    near, far = (
+        swerling1_pd_at_ranges(sensor, budget, rcs_dbsm, range_km + step)
+        for step in (-0.005, 0.005)
+    )
     return float(abs(near - far) + 1e-4)
 
 
@@ -172,7 +179,7 @@ def detection_ranges(printed: Cells) -> Made:
     """Table 4.2: rows of average and simulated ranges, for first and for unbroken detection."""
     flown = measured_ranges_km_by_class()
     runs = run_replicas_of_scene(load_config_scene("thesis/table_4_2"), REPLICAS)
-    simulated = first_and_held_ranges_km(runs)
+    simulated = first_and_unbroken_ranges_km(runs)
     flights = predicted(
         "the radar calibrated to the small class's Pd and 100 flights at 150 m/s closing",
         "thesis/table_4_2.toml:blocks.radar.calibrate",
@@ -204,7 +211,7 @@ def detection_ranges(printed: Cells) -> Made:
 
     def draw(path: Path) -> None:
         bins = np.arange(0.0, 15.5, 0.5)
-        with panels(path, 3, 1, sharex=True, height_in=5.6) as axes:
+        with panels_written_as_png(path, 3, 1, sharex=True, height_in=5.6) as axes:
             for one, (name, (first, held)) in zip(axes, simulated.items(), strict=True):
                 one.hist(first, bins, color=BLUE, alpha=0.55, label="simulated: first detection")
                 one.hist(held, bins, color=ORANGE, alpha=0.55,
@@ -217,7 +224,7 @@ def detection_ranges(printed: Cells) -> Made:
                             label="their average")  # fmt: skip
                 one.set_ylabel(f"flights of {REPLICAS}\nper 0.5 km")
                 one.set_title(f"class {name}, {CLASSES[name][0]} dBsm", loc="left")
-            legend_below(axes[0], 2)
+            draw_legend_below(axes[0], 2)
             axes[-1].set_xlabel("range (km)")
             axes[-1].set_xlim(0, 15.5)
 
@@ -273,14 +280,14 @@ def declaration_ranges_km(runs: list[ThesisRecording], name: str, least: int) ->
 
 def measured_ranges_km_by_class() -> Mapping[str, FloatArray]:
     """Return the detection ranges of Table 4.2 in km, an array for each RCS class."""
-    cells = read_csv("table_4_2.csv")
+    cells = read_thesis_csv("table_4_2.csv")
     return {
         name: np.array([float(cell["range_km"]) for cell in cells if cell["rcs_class"] == name])
         for name in CLASSES
     }
 
 
-def first_and_held_ranges_km(
+def first_and_unbroken_ranges_km(
     runs: list[ThesisRecording],
 ) -> dict[str, tuple[FloatArray, FloatArray]]:
     """Return, by RCS class, two arrays over runs (km): the first detected range, and the range from

@@ -13,22 +13,22 @@ from components.thesis.drawing import (
     GREY,
     IR,
     RADAR,
+    draw_legend_below,
     draw_map,
-    legend_below,
     line_from_ownship,
-    mark_detected_targets,
-    panels,
-    reported_positions,
-    true_positions,
+    mark_true_target_positions,
+    panels_written_as_png,
+    reported_positions_km,
+    true_target_positions_km,
 )
-from components.thesis.radar import CLASSES, pd_at
+from components.thesis.radar import CLASSES, swerling1_pd_at_ranges
 from components.thesis.rows import Cells, Columns, Made, Row, configured, predicted
 from components.thesis.scenes import load_config_scene, radar_parameters, run
 from dsa_des.arrays.types import AnyArray
 from dsa_des.block.mark import BLUE, ORANGE
 
 
-def _concatenate(
+def _concatenate_tables(
     seen: Mapping[Any, Mapping[str, AnyArray]], keys: Iterable[str], name: str = ""
 ) -> dict[str, AnyArray]:
     """Return several tables' given columns end to end, with a column `name` of each row's table."""
@@ -67,20 +67,22 @@ def fields_of_view(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 3, sharey=True, width_in=9.0, height_in=3.6) as axes:
+        with panels_written_as_png(path, 1, 3, sharey=True, width_in=9.0, height_in=3.6) as axes:
             for one, name in zip(axes, EDGES, strict=True):
                 draw_map(one, done, fields_of_view=(name,))
                 style = sensor_marks([name], done.simulation.components)[name]
-                mark_detected_targets(one, done, seen[name], markersize=3.5, color=style.colour)
+                mark_true_target_positions(
+                    one, done, seen[name], markersize=3.5, color=style.colour
+                )
                 one.set_title(f"{name}: ±{printed[name].text}°", loc="left")
                 one.set(xlim=(-6.4, 6.4), ylim=(-4.4, 6.4))
             grey = {"color": GREY, "linestyle": "none", "fillstyle": "none", "markersize": 3.5}
             axes[0].plot([], [], "o", **grey, label="detected (in the sensor's colour)")
-            legend_below(axes[0], without="field of view")
+            draw_legend_below(axes[0], without="field of view")
             for one in axes[1:]:
                 one.set_ylabel("")
 
-    data = _concatenate(seen, ("block", "time_s", "true_azimuth_rad", "true_range_m"))
+    data = _concatenate_tables(seen, ("block", "time_s", "true_azimuth_rad", "true_range_m"))
     caption = (
         "All three sensors' fields of view: the ownship (star) is stationary, the intruder circles "
         "it, and circles mark where each sensor detects it. The range of a field of view is only "
@@ -102,7 +104,7 @@ def detections_over_range(_: Cells) -> Made:
     range_km = np.concatenate([
         np.interp(scans_s, track.time_s, track.range_m) / 1000.0 for track in done.flights.targets
     ])  # fmt: skip
-    pd_of_scan = np.asarray(pd_at(sensor, budget, small_dbsm, range_km))
+    pd_of_scan = np.asarray(swerling1_pd_at_ranges(sensor, budget, small_dbsm, range_km))
     looked = np.histogram(range_km, EDGES_KM)[0]
     result = np.histogram(seen["true_range_m"] / 1000.0, EDGES_KM)[0]
     middle_km = 0.5 * (EDGES_KM[1:] + EDGES_KM[:-1])
@@ -125,16 +127,16 @@ def detections_over_range(_: Cells) -> Made:
     )
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, width_in=9.0, height_in=4.0) as (plan, shares):
+        with panels_written_as_png(path, 1, 2, width_in=9.0, height_in=4.0) as (plan, shares):
             draw_map(plan, done, fields_of_view=("radar",))
             few = {name: column[seen["scan"] % 5 == 0] for name, column in seen.items()}
-            mark_detected_targets(
+            mark_true_target_positions(
                 plan, done, few, markersize=3.5, label="detected (one scan in five)"
             )
             plan.set(xlim=(-16, 16), ylim=(-6, 16))
-            legend_below(plan)
+            draw_legend_below(plan)
             curve_km = np.linspace(1.0, 15.0, 141)
-            curve = pd_at(sensor, budget, small_dbsm, curve_km)
+            curve = swerling1_pd_at_ranges(sensor, budget, small_dbsm, curve_km)
             shares.plot(curve_km, curve, color=BLUE, label="Pd, Swerling I, 1.76 dBsm")
             shares.errorbar(middle_km, share, 2.0 * sigma, fmt="o", markersize=4, color=ORANGE,
                             label="share of scans that detect (±2σ)")  # fmt: skip
@@ -175,23 +177,23 @@ def angular_resolution(printed: Cells) -> Made:
         ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, sharey=True, width_in=9.0, height_in=3.9) as axes:
+        with panels_written_as_png(path, 1, 2, sharey=True, width_in=9.0, height_in=3.9) as axes:
             for one, step in zip(axes, RESOLUTIONS_DEG, strict=True):
                 draw_map(one, runs[step])
                 for azimuth in np.unique(np.round(np.degrees(seen[step]["azimuth_rad"]), 6)):
                     one.plot(
                         *line_from_ownship(azimuth, 6.0), color="#BBBBBB", linewidth=0.5, zorder=0.5
                     )
-                east, north = reported_positions(seen[step])
+                east, north = reported_positions_km(seen[step])
                 one.plot(east, north, "o", color=RADAR, fillstyle="none", markersize=4.5,
                          label="reported by radar")  # fmt: skip
                 one.set_title(f"Radar detection: azimuth resolution {step:g}°", loc="left")
                 one.set(xlim=(-4.2, 4.2), ylim=(-0.4, 5.0))
             axes[1].set_ylabel("")
-            legend_below(axes[0])
+            draw_legend_below(axes[0])
 
     keys = ("time_s", "azimuth_rad", "true_azimuth_rad", "range_m", "true_range_m")
-    data = _concatenate(seen, keys, "resolution_deg")
+    data = _concatenate_tables(seen, keys, "resolution_deg")
     caption = (
         "What happens when the angular resolution of a sensor is changed: reported positions lie "
         "on rays of the grid (grey)."
@@ -227,19 +229,21 @@ def two_fields_of_view(_: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, height_in=4.3) as (axes,):
+        with panels_written_as_png(path, height_in=4.3) as (axes,):
             draw_map(axes, done, fields_of_view=("radar", "eo"))
             for name, (marker, colour) in COMBINATIONS.items():
                 label = f"detected by {name.replace('+', ' and ')}"
-                mark_detected_targets(
+                mark_true_target_positions(
                     axes, done, fused[name], marker=marker, color=colour, label=label
                 )
             axes.set(xlim=(-5.4, 5.4), ylim=(-0.4, 6.2))
-            legend_below(axes, 3)
+            draw_legend_below(axes, 3)
 
-    east, north = zip(*(true_positions(done, rows) for rows in fused.values()), strict=True)
+    east, north = zip(
+        *(true_target_positions_km(done, rows) for rows in fused.values()), strict=True
+    )
     data = {
-        **_concatenate(fused, ("time_s",), "sensors"),
+        **_concatenate_tables(fused, ("time_s",), "sensors"),
         "east_km": np.concatenate(east),
         "north_km": np.concatenate(north),
     }
@@ -286,17 +290,17 @@ def scan_rate(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, sharey=True, width_in=9.0, height_in=4.0) as axes:
+        with panels_written_as_png(path, 1, 2, sharey=True, width_in=9.0, height_in=4.0) as axes:
             for one, rate in zip(axes, RATES_HZ, strict=True):
                 draw_map(one, runs[rate])
-                mark_detected_targets(
+                mark_true_target_positions(
                     one, runs[rate], seen[rate], markersize=3.5, label="detected by radar"
                 )
                 one.set_title(f"Radar detection: scan rate {rate} Hz", loc="left")
             axes[1].set_ylabel("")
-            legend_below(axes[0])
+            draw_legend_below(axes[0])
 
-    data = _concatenate(
+    data = _concatenate_tables(
         seen, ("target", "time_s", "true_azimuth_rad", "true_range_m"), "scan_rate_hz"
     )
     caption = (
@@ -331,14 +335,14 @@ def unsynchronised(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, width_in=9.0, height_in=3.8) as (plan, times):
+        with panels_written_as_png(path, 1, 2, width_in=9.0, height_in=3.8) as (plan, times):
             draw_map(plan, done)
             for height, (name, (marker, colour, size)) in enumerate(_MARKS.items()):
                 label = f"{name.replace('+', ' and ')}{' fused' if '+' in name else ' alone'}"
                 style = {"marker": marker, "color": colour, "markersize": size}
                 first = {key: column[fused[name]["time_s"] < 10.0]
                          for key, column in fused[name].items()}  # fmt: skip
-                mark_detected_targets(plan, done, first, **style, label=label)
+                mark_true_target_positions(plan, done, first, **style, label=label)
                 times.plot(first["time_s"], np.full(len(first["time_s"]), height), **style,
                            fillstyle="none", linestyle="none")  # fmt: skip
             plan.set(xlim=(-1.55, -0.45), ylim=(2.2, 2.8))
@@ -348,8 +352,8 @@ def unsynchronised(printed: Cells) -> Made:
             times.set(xlim=(-0.3, 10.3), ylim=(-0.5, len(_MARKS) - 0.5))
             times.set_title("radar scan rate 5 Hz, IR scan rate 2 Hz", loc="left")
             times.set_xlabel("time (s)")
-            legend_below(plan, 5, without="ownship")
+            draw_legend_below(plan, 5, without="ownship")
 
-    data: Columns = _concatenate(fused, ("time_s",), "sensors")
+    data: Columns = _concatenate_tables(fused, ("time_s",), "sensors")
     caption = "Scenario with two sensors with different scan rates, which are not synchronised."
     return Made.with_figure(rows, "fig_4_22", caption, draw, data)

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from components.thesis.drawing import FUSION, GREY, RADAR, legend_below, panels
+from components.thesis.drawing import FUSION, GREY, RADAR, draw_legend_below, panels_written_as_png
 from components.thesis.rows import Cells, Made, Picture, Printed, Row, calibrated
-from components.thesis.scenes import load_config_scene, run, silhouette_areas
+from components.thesis.scenes import load_config_scene, run, silhouette_area_keywords
 from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 #: Aircraft of Table 3.1, by file.
@@ -34,7 +34,7 @@ def fly_overtaking() -> dict[str, Any]:
     return {"aircraft": file, "left_m": left_m, "above_m": above_m, "joins_km": joins_km}
 
 
-def overtaking_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[Row], Picture]:
+def eo_joining_range_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[Row], Picture]:
     """Return rows and figure of least and greatest range of the EO camera joining, by aircraft."""
     where = (
         f"Passing {LEFT_M[0]} to {LEFT_M[-1]} m to the left, {ABOVE_M[0]} to {ABOVE_M[-1]} m above."
@@ -51,7 +51,7 @@ def overtaking_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[R
         ]
 
     def draw(path: Path) -> None:
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             for (file, name), colour in zip(AIRCRAFT.items(), (BLUE, ORANGE, GREEN), strict=True):
                 for above, style in zip(ABOVE_M, ("o:", "s--", "^-"), strict=True):
                     shown = (flights["aircraft"] == file) & (flights["above_m"] == above)
@@ -63,7 +63,7 @@ def overtaking_spread(flights: dict[str, Any], printed: Printed) -> tuple[list[R
             axes.set_xlabel("distance to the left at which the intruder passes (m)")
             axes.set_ylabel("range within which the EO joins (km)")
             axes.set(xlim=(0, 3500), ylim=(0, 14))
-            legend_below(axes, 3)
+            draw_legend_below(axes, 3)
 
     caption = (
         "The range within which the EO camera joins, by aircraft and by the flight, none of which "
@@ -80,7 +80,10 @@ def _first_eo_fusion_range_km(file: str, left_m: int, above_m: int) -> float:
             f"duration_s={_DURATION_S}",
             f"{intruder}.east_m={-left_m}",
             f"{intruder}.up_m={above_m}",
-            *(f"{intruder}.eo.{name}={area}" for name, area in silhouette_areas(file).items()),
+            *(
+                f"{intruder}.eo.{name}={area}"
+                for name, area in silhouette_area_keywords(file).items()
+            ),
         )
     )
     seen = done.matching_rows("fused", block="fusion")
@@ -105,7 +108,7 @@ def overtaking(printed: Cells) -> Made:
     why = "The scene fig_4_14; sensors as in sensors/oasys.toml and sensors/afrl_eo.toml."
     grid = "Rounding to the grid errs by half a step at most."
     flights = fly_overtaking()
-    others, figure = overtaking_spread(flights, printed["joins_km"])
+    others, figure = eo_joining_range_spread(flights, printed["joins_km"])
     rows = [
         printed["joins_km"].compare(
             "range within which the EO camera joins, in the flight drawn", joins_km, "km",
@@ -133,7 +136,7 @@ def overtaking(printed: Cells) -> Made:
     def draw(path: Path) -> None:
         shown = (("range error (m)", errors_m), ("azimuth error\n(deg)", azimuth),
                  ("elevation error\n(deg)", elevation))  # fmt: skip
-        with panels(path, 3, 1, sharex=True, height_in=5.4) as axes:
+        with panels_written_as_png(path, 3, 1, sharex=True, height_in=5.4) as axes:
             for one, (label, values) in zip(axes, shown, strict=True):
                 for part, marker, colour, said in (
                     (alone, "o", RADAR, "radar alone"),
@@ -148,7 +151,7 @@ def overtaking(printed: Cells) -> Made:
                 f"EO sees the intruder up to {joins_km:.2f} km (dotted); it then flies ahead",
                 loc="left",
             )
-            legend_below(axes[0])
+            draw_legend_below(axes[0])
             axes[-1].set_xlabel("time (s)")
             far = axes[-1].secondary_xaxis(
                 -0.42,

@@ -10,7 +10,7 @@ from components.radar.detection import detection_probability, required_snr
 from components.radar.detection.approximations import detection_table
 from components.radar.link_budget import LinkBudget, detection_range
 from components.radar.swerling import SwerlingParameters
-from components.thesis.drawing import GREY, legend_below, panels
+from components.thesis.drawing import GREY, draw_legend_below, panels_written_as_png
 from components.thesis.rows import Cells, Made, Printed, Row, calibrated, predicted
 from components.thesis.scenes import load_config_scene, radar_parameters, run
 from dsa_des.arrays.types import FloatArray
@@ -37,7 +37,7 @@ def _detector_arguments(sensor: SwerlingParameters) -> dict[str, Any]:
     }
 
 
-def pd_at(
+def swerling1_pd_at_ranges(
     sensor: SwerlingParameters, budget: LinkBudget, rcs_dbsm: float, range_km: float | FloatArray
 ) -> Any:
     """Return the Swerling I detection probability of a target of this RCS at given ranges."""
@@ -92,7 +92,7 @@ def pd_over_snr(_: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             for (name, pd), colour in zip(exact.items(), (BLUE, ORANGE), strict=True):
                 axes.plot(snr_db, pd, color=colour, label=f"{name}, exact")
             axes.plot(snr_db, series, ":", color=GREY, label="Swerling V, eq. 27 (corrected)")
@@ -141,14 +141,15 @@ def snr_and_pd_over_range(name: str, figure: str, thesis: Printed, _: Cells) -> 
     snr_there = float(budget.snr(1000.0 * average_km, dbsm_to_m2(rcs_dbsm)))
     source = "Swerling I with sensors/oasys.toml, whose bandwidth follows from the small class."
     rows = [
-        Row(f"Pd at {average_km:.2f} km", float(pd_at(sensor, budget, rcs_dbsm, average_km)), "",
+        Row(f"Pd at {average_km:.2f} km", float(swerling1_pd_at_ranges(sensor, budget, rcs_dbsm,
+        average_km)), "",
             f"{source} The figure prints none; §4.1.3 does, and is compared there."),
         Row(f"SNR at {average_km:.2f} km", 10.0 * np.log10(snr_there), "dB", source),
         Row("range of Pd 0.9", range_of_pd_km(sensor, rcs_dbsm), "km", source),
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 2, 1, sharex=True, height_in=4.6) as (upper, lower):
+        with panels_written_as_png(path, 2, 1, sharex=True, height_in=4.6) as (upper, lower):
             upper.plot(range_km, snr_db, color=BLUE, label=f"SNR, {rcs_dbsm} dBsm")
             upper.set_ylabel("SNR (dB)")
             lower.plot(range_km, fluctuating, color=BLUE, label="Pd, Swerling I")
@@ -187,7 +188,7 @@ def specified_range(printed: Cells) -> Made:
     first_km = float(seen["true_range_m"][0]) / 1000.0
 
     def pd_of(sensor: SwerlingParameters, range_km: float) -> float:
-        return float(pd_at(sensor, sensor.link_budget(), RCS_DBSM, range_km))
+        return float(swerling1_pd_at_ranges(sensor, sensor.link_budget(), RCS_DBSM, range_km))
 
     flown = predicted("the radar calibrated to the flight tests", "sensors/oasys.toml:calibrate")
     rows = [
@@ -221,12 +222,12 @@ def specified_range(printed: Cells) -> Made:
     ]  # fmt: skip
     range_km = np.linspace(2.0, 15.0, 261)
     curves = {
-        name: pd_at(sensor, sensor.link_budget(), RCS_DBSM, range_km)
+        name: swerling1_pd_at_ranges(sensor, sensor.link_budget(), RCS_DBSM, range_km)
         for name, (sensor, _) in sensors.items()
     }
 
     def draw(path: Path) -> None:
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             for name, (_, colour) in sensors.items():
                 axes.plot(range_km, curves[name], color=colour, label=f"calibrated to: {name}")
             for km, text, side in (
@@ -240,7 +241,7 @@ def specified_range(printed: Cells) -> Made:
             axes.set_xlabel("range (km)")
             axes.set_ylabel("Pd of 5 m², Swerling I [1]")
             axes.set(xlim=(2, 15), ylim=(0, 1.03))
-            legend_below(axes, 2)
+            draw_legend_below(axes, 2)
 
     data = {"range_km": range_km, **{f"pd, {name}": pd for name, pd in curves.items()}}
     caption = "Detection of a target of 5 m² by three calibrations of the OASys radar."

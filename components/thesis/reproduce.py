@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from components.thesis.rows import DIFFERS, Columns, Made, Row, tally
+from components.thesis.rows import DIFFERS, Columns, Made, Row, tally_sentence
 from components.thesis.table import ITEMS, Item, select_items
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.files.output_file import check_file_writable, write_file
@@ -56,7 +56,9 @@ def reproduce_items(
 
 
 def make_items(wanted: list[Item]) -> tuple[Results, list[str]]:
-    """Compute the items; return each with its result, and a sentence for each that failed."""
+    """Compute the items; return those that succeeded with their results, and a sentence for each
+    failure.
+    """
     results: Results = []
     failures = []
     for item in wanted:
@@ -84,7 +86,7 @@ def write_results(folder: Path, results: Results, failures: list[str], wall_s: f
         for name, columns in made.data.items():
             _write_csv(folder / "data" / f"{name}.csv", columns)
     rows = [row.as_dict(item.name) for item, made in results for row in made.rows]
-    _write_rows(folder / "rows.csv", rows)
+    _write_rows_csv(folder / "rows.csv", rows)
     (folder / "thesis.md").write_text(markdown_page(results, "figures"), encoding="utf-8")
     content: dict[str, Any] = {
         "title": "The thesis, figure by figure",
@@ -129,7 +131,7 @@ def _print_results(results: Results, target: Path) -> None:
     console.print(shown)
     console.print()
     rows = [row for _, made in results for row in made.rows]
-    console.print(tally(rows), highlight=False, soft_wrap=True)
+    console.print(tally_sentence(rows), highlight=False, soft_wrap=True)
     console.print(f"{target}: figures, data, rows.csv, thesis.md", highlight=False, soft_wrap=True)
 
 
@@ -139,7 +141,7 @@ def _write_csv(path: Path, columns: Columns) -> None:
     _write_lines(path, [list(columns), *lines])
 
 
-def _write_rows(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def _write_rows_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write compared rows as they are in JSON; what does not exist is an empty field."""
     names = list(rows[0]) if rows else []
     _write_lines(path, [names, *([_csv_text(row[name]) for name in names] for row in rows)])
@@ -169,7 +171,7 @@ def four_digit_text(value: float, sign: bool = False) -> str:
 def markdown_page(results: Results, images: str) -> str:
     """Return the Markdown page of all results; `images` is the figures' folder as seen from it."""
     rows = [row for _, made in results for row in made.rows]
-    head = _PAGE.read_text(encoding="utf-8").format(tally=tally(rows, "*"))
+    head = _PAGE.read_text(encoding="utf-8").format(tally=tally_sentence(rows, "*"))
     return "\n".join([head, *(_markdown_section(item, made, images) for item, made in results)])
 
 
@@ -179,7 +181,7 @@ def _markdown_section(item: Item, made: Made, images: str) -> str:
     extra = (" derived |", " ---: |") if derived else ("", "")
     lines += [f"| quantity | printed |{extra[0]} ours | difference | unit | verdict | from |"]
     lines += [f"| --- | ---: |{extra[1]} ---: | ---: | --- | --- | --- |"]
-    said = footnotes(made.rows)
+    said = footnote_letters_by_text(made.rows)
     lines += [markdown_table_row(row, derived, said) for row in made.rows]
     lines.append("")
     if said:
@@ -191,8 +193,10 @@ def _markdown_section(item: Item, made: Made, images: str) -> str:
     return "\n".join(lines)
 
 
-def footnotes(rows: Sequence[Row]) -> dict[str, str]:
-    """Return footnotes: each text that several rows would repeat, with its letter in brackets."""
+def footnote_letters_by_text(rows: Sequence[Row]) -> dict[str, str]:
+    """Return the footnotes of texts that several rows would repeat: by text its letter in
+    brackets.
+    """
     said: Counter[str] = Counter()
     for row in rows:
         said.update([*row.source_sentences, *([row.because] if row.verdict == DIFFERS else [])])

@@ -90,7 +90,7 @@ class Row:
         return 0.5 * 10.0**-decimals
 
     @property
-    def is_near(self) -> bool:
+    def is_within_tolerance(self) -> bool:
         """Return whether the simulated number is within tolerance of the printed one."""
         difference = self.difference
         # The last bits of a subtraction must not tip a number that lies on the edge.
@@ -98,12 +98,14 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """Return one of `VERDICTS`; a printed number needs a basis, and a reason if it differs."""
+        """Return how our number compares with the printed one; ValueError without basis or due
+        reason.
+        """
         if self.printed is None:
             return SILENT
         if self.basis is None:
             raise ValueError(f"{self.quantity}: printed {self.printed}, and no basis of ours")
-        if self.is_near:
+        if self.is_within_tolerance:
             return self.basis.kind
         if not self.because:
             raise ValueError(
@@ -198,8 +200,10 @@ Cells = Mapping[str, Printed]
 Columns = Mapping[str, Sequence[Any] | Any]
 
 
-def tally(rows: Sequence[Row], mark: str = "") -> str:
-    """Return a sentence with the rows by verdict, each in marks, and the quantities that agree."""
+def tally_sentence(rows: Sequence[Row], mark: str = "") -> str:
+    """Return a sentence that counts rows by verdict and lists agreeing predictions; `mark` encloses
+    names.
+    """
     verdicts = [row.verdict for row in rows]
     counts = ", ".join(f"{verdicts.count(name)} {mark}{name}{mark}" for name in VERDICTS)
     agree = [row.quantity for row in rows if row.is_agreeing_prediction]

@@ -63,15 +63,17 @@ def aircraft(name: str) -> Aircraft:
     return Aircraft.model_validate(read_config(f"aircraft/{name}"))
 
 
-def silhouette_areas(name: str, band: str = "eo") -> dict[str, Any]:
-    """Return an aircraft's areas (m²) in one band, eo or ir, as silhouette model keywords."""
+def silhouette_area_keywords(name: str, band: str = "eo") -> dict[str, Any]:
+    """Return an aircraft's areas (m²) in one band, eo or ir, by keyword of the silhouette
+    models.
+    """
     result: dict[str, Any] = getattr(aircraft(name), band).model_dump(
         exclude={"silhouette_table", "made_for"}
     )
     return result
 
 
-def read_csv(name: str) -> list[dict[str, str]]:
+def read_thesis_csv(name: str) -> list[dict[str, str]]:
     """Return the rows of a CSV file of ``configs/thesis``; lines with ``#`` are comments."""
     text = (configs() / "thesis" / name).read_text(encoding="utf-8").splitlines()
     return list(csv.DictReader(line for line in text if not line.startswith("#")))

@@ -144,7 +144,7 @@ def compare_silhouettes(
     return comparisons
 
 
-def comparison_table(comparisons: Sequence[RotationComparison]) -> str:
+def comparison_table_text(comparisons: Sequence[RotationComparison]) -> str:
     """Return the mean and maximum errors as a text table like Table 4.3."""
     names = [("model", "reference"), *((one.model, one.reference) for one in comparisons)]
     first, second = (max(len(pair[column]) for pair in names) for column in (0, 1))
@@ -221,7 +221,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
                 comparisons = _compare(options)
             except OSError as error:  # of what is read, not of what is written
                 raise ValueError(str(error)) from error
-            say_lines(comparison_table(comparisons))
+            say_lines(comparison_table_text(comparisons))
             _write_tables(comparisons, folder)
             draw_comparison(comparisons, folder / "silhouettes.png", title=options.title or "")
             write_run_json(folder, {"title": options.title or "", "models": options.models})
@@ -284,10 +284,10 @@ def _compare(options: argparse.Namespace) -> list[RotationComparison]:
         models[name] = partial(visible_area, model=name, **areas)
     references: dict[str, Silhouette] = {}
     if options.reference is not None:
-        from components.aircraft.aspect_tables import read_aspect_table
+        from components.aircraft.aspect_tables import read_silhouette_table
 
         try:
-            table = read_aspect_table(options.reference)
+            table = read_silhouette_table(options.reference)
         except InputFileError as error:
             raise ValueError(f"--reference {options.reference}: {error}") from None
         references["table"] = partial(visible_area, model="aspect_table", table=table)

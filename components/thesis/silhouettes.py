@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from components.optical.silhouette import front_and_back_area, visible_area
-from components.thesis.drawing import panels
+from components.optical.silhouette import blend_front_and_back_area, visible_area
+from components.thesis.drawing import panels_written_as_png
 from components.thesis.rows import Cells, Made, Row, configured, predicted
-from components.thesis.scenes import silhouette_areas
+from components.thesis.scenes import silhouette_area_keywords
 from components.thesis.silhouette_comparison import (
     AXES,
     RotationComparison,
@@ -66,14 +66,14 @@ DIFFER = {
 }
 
 
-def front_and_back(printed: Cells) -> Made:
+def front_and_back_contributions(printed: Cells) -> Made:
     """Fig. 3.11: the contributions of both spheres (eq. 20) and their sum (eq. 21) over heading."""
     heading_deg = np.arange(0.0, 361.0)
     cosine = np.cos(np.radians(heading_deg))
     none = np.zeros_like(cosine)
-    back = front_and_back_area(cosine, none, none + BACK_M2)
-    front = front_and_back_area(cosine, none + FRONT_M2, none)
-    together = front_and_back_area(cosine, none + FRONT_M2, none + BACK_M2)
+    back = blend_front_and_back_area(cosine, none, none + BACK_M2)
+    front = blend_front_and_back_area(cosine, none + FRONT_M2, none)
+    together = blend_front_and_back_area(cosine, none + FRONT_M2, none + BACK_M2)
     why = (
         "Eq. 21 with a the back and b the front; heading 0 flies away and shows the back "
         "(errata 12)."
@@ -91,7 +91,7 @@ def front_and_back(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path) as (axes,):
+        with panels_written_as_png(path) as (axes,):
             axes.plot(heading_deg, back, "--", color=BLUE, label="back sphere, a = 1 m²")
             axes.plot(heading_deg, front, ":", color=ORANGE, label="front sphere, b = 1.5 m²")
             axes.plot(heading_deg, together, color=GREEN, label="sum (eq. 21)")
@@ -105,7 +105,7 @@ def front_and_back(printed: Cells) -> Made:
     return Made.with_figure(rows, "fig_3_11", caption, draw, data)
 
 
-def rotations(file: str, figure: str, _: Cells) -> Made:
+def signatures_over_rotations(file: str, figure: str, _: Cells) -> Made:
     """Figs 4.8 to 4.10: the signature of one aircraft over half turns about the three axes."""
     result = _comparisons(file)
     rows = [
@@ -126,7 +126,7 @@ def rotations(file: str, figure: str, _: Cells) -> Made:
     return Made.with_figure(rows, figure, _CAPTION.format(NAMES[file]), draw, data)
 
 
-def errors(printed: Cells) -> Made:
+def silhouette_errors(printed: Cells) -> Made:
     """Table 4.3: mean and maximum errors of the thesis's equations, against two references."""
     rows = []
     for file, axis in ((file, axis) for file in NAMES for axis in AXES):
@@ -190,7 +190,7 @@ def _comparisons(file: str) -> list[RotationComparison]:
 
 
 def _silhouette(file: str, model: str) -> Silhouette:
-    known = silhouette_areas(file)
+    known = silhouette_area_keywords(file)
     return lambda *view: visible_area(*view, **known, model=model)
 
 

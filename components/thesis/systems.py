@@ -12,7 +12,7 @@ from components.geometry import line_of_sight_ned, wrap_by_sines
 from components.messages.state_tracks import covariance_matrices
 from components.optical.detection import detection_probability
 from components.thesis.cameras import KING_AIR_M2
-from components.thesis.drawing import EO, GREY, RADAR, legend_below, panels
+from components.thesis.drawing import EO, GREY, RADAR, draw_legend_below, panels_written_as_png
 from components.thesis.radar import NAUTICAL_MILE_KM, range_of_pd_km
 from components.thesis.rows import Basis, Cells, Columns, Made, Picture, Row, configured, predicted
 from components.thesis.scenes import (
@@ -44,7 +44,9 @@ class Errors:
     elevation_deg: FloatArray
     east_m: FloatArray
 
-    def statistics_by_range(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def mean_and_deviation_by_range(
+        self, values: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the centre (km) of each 1 km range bin with at least two values, and mean and
         standard deviation of the values there.
         """
@@ -88,16 +90,16 @@ def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
                     ))  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, 1, 2, width_in=9.0, height_in=3.9) as (angles, plan):
+        with panels_written_as_png(path, 1, 2, width_in=9.0, height_in=3.9) as (angles, plan):
             for (name, colour), label in zip(
                 (("radar", RADAR), ("eo", EO)), ("radar", "EO"), strict=True
             ):
                 for quantity, style in (("azimuth", "o-"), ("elevation", "s--")):
                     values = getattr(errors[name], f"{quantity}_deg")
-                    middle, mean, spread = errors[name].statistics_by_range(values)
+                    middle, mean, spread = errors[name].mean_and_deviation_by_range(values)
                     angles.plot(middle, np.hypot(mean, spread), style, color=colour, markersize=4,
                                 label=f"{label}, {quantity}")  # fmt: skip
-            middle, mean, spread = radar.statistics_by_range(radar.east_m)
+            middle, mean, spread = radar.mean_and_deviation_by_range(radar.east_m)
             plan.errorbar(middle, mean, spread, fmt="o-", color=RADAR, markersize=4,
                             label="radar: mean ± standard deviation")  # fmt: skip
             angles.set_ylabel("root mean square angle error (deg)")
@@ -107,14 +109,16 @@ def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
             for axes in (angles, plan):
                 axes.set_xlabel("range (km)")
             angles.set_title("angles in north-east-down, as believed", loc="left")
-            legend_below(angles)
+            draw_legend_below(angles)
 
     data: dict[str, list[float | str]] = {"sensor": [], "range_km": []}
     kinds = ("azimuth", "elevation")
     data |= {f"{kind}_{part}_deg": [] for kind in kinds for part in ("mean", "std")}
     for name, result in errors.items():
         for kind in kinds:
-            middle, mean, spread = result.statistics_by_range(getattr(result, f"{kind}_deg"))
+            middle, mean, spread = result.mean_and_deviation_by_range(
+                getattr(result, f"{kind}_deg")
+            )
             data[f"{kind}_mean_deg"] += mean.tolist()
             data[f"{kind}_std_deg"] += spread.tolist()
         data["sensor"] += [name] * len(middle)
@@ -129,7 +133,7 @@ def _tecvol_errors(printed: Cells) -> tuple[list[Row], Picture, Columns]:
 
 def _errors_of_sensor(runs: list[ThesisRecording], flights: Flights, name: str) -> Errors:
     """Return azimuth, elevation and east errors in all runs; the ownship flies level north."""
-    parts = [_join_own_position(run, name) for run in runs]
+    parts = [_detections_with_own_position(run, name) for run in runs]
     seen = {key: np.concatenate([part[key] for part in parts])
             for key in ("time_s", "ned_azimuth_rad", "ned_elevation_rad", "true_azimuth_rad",
                         "true_elevation_rad", "true_range_m", "range_m", *_PLACE)}  # fmt: skip
@@ -142,7 +146,7 @@ def _errors_of_sensor(runs: list[ThesisRecording], flights: Flights, name: str) 
     )
 
 
-def _join_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
+def _detections_with_own_position(run: ThesisRecording, name: str) -> dict[str, Any]:
     """Return a sensor's detections (columns) with the ownship's believed position at each."""
     result, scans = (
         run.matching_rows("detections", block=name),
@@ -211,7 +215,7 @@ def systems(printed: Cells) -> Made:
         name: run(load_config_scene(f"systems/{name}", swaps=swaps.get(name, ())))
         for name in SYSTEMS
     }
-    first = {name: first_ranges_km(done) for name, done in runs.items()}
+    first = {name: first_detection_ranges_km(done) for name, done in runs.items()}
     statistics, errors, errors_data = _tecvol_errors(printed)
     rows = [
         Row(f"{name}.toml, first detection of {target}", km, "km",
@@ -223,10 +227,10 @@ def systems(printed: Cells) -> Made:
     rows += [
         *_afrl_rows(printed, runs, first["afrl"]),
         *statistics,
-        *_smart_uav_rows(printed),
-        *_parca_rows(printed),
+        *_smart_uav_rcs_rows(printed),
+        *_parca_range_error_rows(printed),
     ]
-    by_laser = first_ranges_km(runs["smart_uav"], "laser")
+    by_laser = first_detection_ranges_km(runs["smart_uav"], "laser")
     rows += [
         Row(f"smart_uav.toml, first detection of {target} by the laser", km, "km",
             "sensors/wire_laser.toml, a wire of 10 mm; published: over 10 mm from 0.6 km on.")
@@ -234,7 +238,7 @@ def systems(printed: Cells) -> Made:
     ]  # fmt: skip
 
     def draw(path: Path) -> None:
-        with panels(path, width_in=7.4, height_in=5.4) as (axes,):
+        with panels_written_as_png(path, width_in=7.4, height_in=5.4) as (axes,):
             height, ticks, names = 0.0, [], []
             for name, result in reversed(first.items()):
                 start = height
@@ -271,7 +275,7 @@ def systems(printed: Cells) -> Made:
     )
 
 
-def first_ranges_km(done: SceneRun, block: str = "") -> dict[str, float]:
+def first_detection_ranges_km(done: SceneRun, block: str = "") -> dict[str, float]:
     """Return, by target in the scene's order, the range (km) at which it was first detected.
 
     By any sensor, or by one.
@@ -318,7 +322,7 @@ def _afrl_rows(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float
             f"AFRL, first detection of the {size} aircraft", first[name] / NAUTICAL_MILE_KM, "NM",
             f"Printed of the flight tests. {why}", seen)
           for size, name in (("small", "king_air"), ("large", "convair"))),
-        *_declaration_rows(printed, runs["afrl"]),
+        *_camera_pd_rows(printed, runs["afrl"]),
     ]  # fmt: skip
 
 
@@ -326,7 +330,7 @@ def _afrl_rows(printed: Cells, runs: dict[str, SceneRun], first: dict[str, float
 BONANZA_M2 = 10.0
 
 
-def _declaration_rows(printed: Cells, done: SceneRun) -> list[Row]:
+def _camera_pd_rows(printed: Cells, done: SceneRun) -> list[Row]:
     """Return rows on the cameras' range of Pd 0.9, and the Pd of a Bonanza at 2 and 3.5 NM."""
     camera: Any = done.simulation.components["centre"]
     result = camera.detector
@@ -355,7 +359,7 @@ def _declaration_rows(printed: Cells, done: SceneRun) -> list[Row]:
     return rows
 
 
-def _parca_rows(printed: Cells) -> list[Row]:
+def _parca_range_error_rows(printed: Cells) -> list[Row]:
     """Return rows on a camera track's stated relative range error before and after S-turns."""
     tracks = run(
         load_config_scene("tracking/passive_ranging", "blocks.tracker.passive_range_share=10")
@@ -374,7 +378,7 @@ def _parca_rows(printed: Cells) -> list[Row]:
     return rows
 
 
-def _smart_uav_rows(printed: Cells) -> list[Row]:
+def _smart_uav_rcs_rows(printed: Cells) -> list[Row]:
     """Return table rows with the RCS of each target of Table 2.3 and its range of Pd 0.9."""
     sensor = radar_parameters()
     rows = []

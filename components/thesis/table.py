@@ -84,7 +84,8 @@ _FLIGHTS = {
 
 ITEMS = (
     # §3.5.3: "the parameters a and b are set to 1 and 1.5 for the plot".
-    Item("fig-3.11", "Front and back sphere over relative heading", silhouettes.front_and_back,
+    Item("fig-3.11", "Front and back sphere over relative heading",
+    silhouettes.front_and_back_contributions,
          {"back": Printed("1"), "front": Printed("1.5")}),
     Item("fig-4.2", "Pd of Swerling I and V over SNR, with the truncated table",
          radar.pd_over_snr),
@@ -109,13 +110,14 @@ ITEMS = (
     Item("table-4.2", "Detection ranges of the flight tests", flight_tests.detection_ranges,
          _printed_numbers({"small": "6.91", "medium": "7.31", "large": "9.75"})),
     Item("fig-4.8", "Signature of the Beech 99 over rotation",
-         partial(silhouettes.rotations, "beech_99", "fig_4_8")),
+         partial(silhouettes.signatures_over_rotations, "beech_99", "fig_4_8")),
     Item("fig-4.9", "Signature of the F-16 over rotation",
-         partial(silhouettes.rotations, "f_16", "fig_4_9")),
+         partial(silhouettes.signatures_over_rotations, "f_16", "fig_4_9")),
     Item("fig-4.10", "Signature of the Boeing 787 over rotation",
-         partial(silhouettes.rotations, "boeing_787", "fig_4_10")),
+         partial(silhouettes.signatures_over_rotations, "boeing_787", "fig_4_10")),
     # Mean and maximum errors over half turns, per cent.
-    Item("table-4.3", "Mean and maximum errors of the aircraft models", silhouettes.errors,
+    Item("table-4.3", "Mean and maximum errors of the aircraft models",
+    silhouettes.silhouette_errors,
          {**_printed_numbers({
              "beech_99 x mean": "3.5", "beech_99 x maximum": "10",
              "beech_99 y mean": "11.5", "beech_99 y maximum": "18.8",

@@ -15,20 +15,20 @@ from components.sensor.palette import FUSION
 from components.track_fusion.fused_tracks import (
     empty_fused_tracks,
     fuse_states,
+    fused_tracks_to_report,
     state_tracks_message,
-    update_reported,
 )
 from components.track_fusion.local_tracks import (
     LocalTracks,
     initial_records,
     local_tracks_and_rows,
-    update_newest,
+    records_with_newest_instants,
 )
 from components.track_fusion.track_association import (
     MatchRules,
-    drop_strays,
+    assign_fused_numbers,
     leader_indices,
-    match_tracks,
+    reset_numbers_of_strays,
 )
 from dsa_des.arrays.keyed_table import KeyedTable, indices_by_occurrence
 from dsa_des.arrays.run_ticks import last_position_at_or_before
@@ -203,22 +203,24 @@ class CovarianceIntersection(Component):
             fused = self._fuse_tracks(local, records, reported, rows[at], replica[at])
             parts.append(fused)
             kept = fused.take(fused.track_status != DELETED)
-            reported = reported.replace_runs(replica[at], kept, wake.first_run)
+            reported = reported.replace_and_drop_earlier_runs(replica[at], kept, wake.first_run)
         runs, first = records.replica, wake.first_run
-        self._records = self._records.replace_runs(runs, records, first)
-        self._local = self._local.replace_runs(runs, local, first)
-        self._reported = self._reported.replace_runs(runs, reported, first)
+        self._records = self._records.replace_and_drop_earlier_runs(runs, records, first)
+        self._local = self._local.replace_and_drop_earlier_runs(runs, local, first)
+        self._reported = self._reported.replace_and_drop_earlier_runs(runs, reported, first)
         return state_tracks_message(
             KeyedTable.concatenate(parts), rows, wake.instants.take(rows), self.sensors
         )
 
     def _select_newest_reports(self, new: Arrivals, wake: Wake) -> Arrivals:
-        """Return the reports to use: each tracker's newest at an instant, none overtaken."""
+        """Return the reports to use: a tracker's last of each instant, none older than one that
+        came before.
+        """
         made, replica = new.message.tick, new.message.run
         newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
         more = max(int(replica[-1]) + 1 - len(newest), 0)
         newest = np.append(newest, np.full(more, np.iinfo(np.int64).min))
-        so_far = np.maximum(new.message.instants.running_latest().tick, newest[replica])
+        so_far = np.maximum(new.message.instants.running_largest_tick().tick, newest[replica])
         kept = made >= so_far
         next_ = (new.tick[1:] == new.tick[:-1]) & (replica[1:] == replica[:-1])
         kept[:-1] &= ~(next_ & kept[1:])
@@ -287,19 +289,19 @@ class CovarianceIntersection(Component):
         """Return the trackers' tracks and the records after reports at one row per replica: old
         reports replaced, tracks matched anew.
         """
-        new = new.copy_fused_numbers(local)
+        new = new.with_fused_numbers_from(local)
         gone = np.zeros(len(local), dtype=bool)
         for index, rows in enumerate(reported_at):
             gone |= (local.tracker == index) & np.isin(local.replica, replica[np.isin(at, rows)])
         local = LocalTracks.concatenate([local.take(~gone), new])
-        records = update_newest(records, new, self._on_board)
+        records = records_with_newest_instants(records, new, self._on_board)
         when = records.time_s[np.searchsorted(records.replica, local.replica)]
         now = np.isin(local.replica, replica)
         silent = now & (when - local.updated_s > self.p.drop_after_s)
         idle, busy, when = local.take(~now), local.take(now & ~silent), when[now & ~silent]
         if len(busy):
-            busy = drop_strays(self._rules, busy, when)
-            busy, next_number = match_tracks(
+            busy = reset_numbers_of_strays(self._rules, busy, when)
+            busy, next_number = assign_fused_numbers(
                 self._rules, busy, when, len(self.trackers), records.next_number, records.replica
             )
             records = records.with_columns(next_number=next_number)
@@ -326,6 +328,6 @@ class CovarianceIntersection(Component):
         when = records.time_s[np.searchsorted(records.replica, mine.replica)]
         fused = fuse_states(mine, when, self._rules.motion, self.p.rule)
         of = np.searchsorted(records.replica, fused.replica)
-        return update_reported(
+        return fused_tracks_to_report(
             before, fused, mine, records.origin[:, of], records.own_m[:, of], replica, at
         )

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from components.estimation.batched import matrix_times_vector, multiply_by_transpose, product
+from components.estimation.batched import matrix_product, matrix_times_vector, multiply_by_transpose
 from components.estimation.covariance_intersection import Rule, intersect_covariances, inverse
 from components.estimation.frame import SensorPose
 from components.estimation.measurement import Kind, linearise
@@ -39,7 +39,7 @@ def fuse_states(
     leader, of = leader_indices(tracks)
     count = len(leader)
     rank = _ranks_in_fused_track(tracks, of)
-    state, covariance = tracks.predict_to(time_s, motion)
+    state, covariance = tracks.states_and_covariances_at(time_s, motion)
     x, p = state[:, leader].copy(), covariance[:, :, leader].copy()
     for turn in range(1, int(rank.max(initial=0)) + 1):
         member = np.flatnonzero((rank == turn) & tracks.ranged[leader[of]])
@@ -54,7 +54,7 @@ def fuse_states(
             else:
                 angles = linearised_direction(tracks.take(mine), x[:, into], time_s[mine])
                 weighed = angles.jacobian.swapaxes(0, 1) / angles.variance
-                information = product(weighed, angles.jacobian)
+                information = matrix_product(weighed, angles.jacobian)
                 pull = matrix_times_vector(weighed, angles.residual)
             shift, result, _ = intersect_covariances(p[:, :, into], information, pull, rule)
             x[:, into] += shift
@@ -113,7 +113,7 @@ def empty_fused_tracks() -> KeyedTable:
     return KeyedTable.empty({**dict.fromkeys(_WHOLE, int), **floats, "has_range": bool}, shapes)
 
 
-def update_reported(
+def fused_tracks_to_report(
     before: KeyedTable,
     fused: KeyedTable,
     members: LocalTracks,
@@ -132,9 +132,9 @@ def update_reported(
     contributors[known] |= before.contributors[old[known]]
     axes = np.repeat(np.eye(3)[:, :, np.newaxis], count, axis=2)
     seen, by_state = linearise(Kind(False), fused.state, SensorPose(own_m, axes))
-    spread = multiply_by_transpose(product(by_state, fused.covariance[:3, :3]), by_state)
+    spread = multiply_by_transpose(matrix_product(by_state, fused.covariance[:3, :3]), by_state)
     newest = members.take(fused.newest)
-    azimuth, elevation = newest.direction_in_frame_rad()
+    azimuth, elevation = newest.azimuth_elevation_in_frame_rad()
     state_s = np.where(ranged, fused.state_s, newest.time_s)
     columns = {name: fused.columns[name] for name in fused.columns if name != "newest"}
     new = KeyedTable(**columns).with_columns(

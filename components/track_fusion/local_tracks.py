@@ -48,14 +48,18 @@ class LocalTracks(KeyedTable):
         trackers = 64
         return (self.replica * trackers + self.tracker) * _NUMBERS + self.number
 
-    def predict_to(
+    def states_and_covariances_at(
         self, time_s: FloatArray, motion: ConstantVelocity
     ) -> tuple[FloatArray, FloatArray]:
-        """Return states (6, n), covariances (6, 6, n) at instants (s), none before the track's."""
+        """Return states (6, n) and covariances (6, 6, n) predicted to instants, s, not before the
+        tracks' own.
+        """
         return motion.predict(self.state, self.covariance, time_s - self.time_s)
 
-    def copy_fused_numbers(self, old: Self) -> Self:
-        """Return these tracks with their fused track's number in an older table, else 0."""
+    def with_fused_numbers_from(self, old: Self) -> Self:
+        """Return these tracks with the fused track number that each has in `old`; 0 if it is not in
+        there.
+        """
         if len(old) == 0 or len(self) == 0:
             return self
         known = old.unique_numbers()
@@ -68,7 +72,7 @@ class LocalTracks(KeyedTable):
         """Return position and axes of the sensors that the tracks' directions are measured from."""
         return SensorPose(self.own_m, self.turn.swapaxes(0, 1))
 
-    def direction_in_frame_rad(self) -> tuple[FloatArray, FloatArray]:
+    def azimuth_elevation_in_frame_rad(self) -> tuple[FloatArray, FloatArray]:
         """Return azimuth from north and elevation (rad) of tracks' directions in replica frames."""
         unit = np.stack(unit_vector_unchecked(self.azimuth_rad, self.elevation_rad))
         north, east, down = matrix_times_vector(self.turn, unit)
@@ -151,8 +155,11 @@ def initial_records(replicas: IntArray) -> KeyedTable:
     )
 
 
-def update_newest(records: KeyedTable, new: LocalTracks, on_board: BoolArray) -> KeyedTable:
-    """Return the newest instant's records of any track, and the ownship's position there.
+def records_with_newest_instants(
+    records: KeyedTable, new: LocalTracks, on_board: BoolArray
+) -> KeyedTable:
+    """Return records updated by new tracks: each replica's newest instant, and the ownship's
+    position.
 
     `on_board` says of each tracker whether it is.
     """

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from components.association.assignment import gate_threshold, global_nearest_pairs
+from components.association.assignment import least_total_pair_indices, squared_gate_distance
 from components.estimation.batched import (
     cholesky,
     mahalanobis_squared,
+    matrix_product,
     multiply_by_transpose,
-    product,
 )
 from components.estimation.measurement import Kind, linearise, residual
 from components.estimation.motion import ConstantVelocity
@@ -75,24 +75,24 @@ def gate_distance_ratio(
     none = ~(leader.ranged | other.ranged)
     if both.any():
         mine, theirs = leader.take(both), other.take(both)
-        x, p = mine.predict_to(time_s[both], rules.motion)
-        y, q = theirs.predict_to(time_s[both], rules.motion)
-        share[both] = mahalanobis_squared(cholesky(p + q), x - y) / gate_threshold(
+        x, p = mine.states_and_covariances_at(time_s[both], rules.motion)
+        y, q = theirs.states_and_covariances_at(time_s[both], rules.motion)
+        share[both] = mahalanobis_squared(cholesky(p + q), x - y) / squared_gate_distance(
             rules.gate_probability, 6
         )
-    two = gate_threshold(rules.gate_probability, 2)
+    two = squared_gate_distance(rules.gate_probability, 2)
     if one.any():
         swap = other.ranged & one
         mine = LocalTracks.concatenate([leader.take(one & ~swap), other.take(swap)])
         theirs = LocalTracks.concatenate([other.take(one & ~swap), leader.take(swap)])
         when = np.concatenate([time_s[one & ~swap], time_s[swap]])
-        x, p = mine.predict_to(when, rules.motion)
+        x, p = mine.states_and_covariances_at(when, rules.motion)
         angles = linearised_direction(theirs, x, when)
-        spread = multiply_by_transpose(product(angles.jacobian, p), angles.jacobian)
+        spread = multiply_by_transpose(matrix_product(angles.jacobian, p), angles.jacobian)
         for i in range(2):
             spread[i, i] += angles.variance[i]
         result = mahalanobis_squared(cholesky(spread), angles.residual) / two
-        result[_may_be_oneself(rules, mine, theirs, x, p)] = np.inf
+        result[_may_be_seeing_platform(rules, mine, theirs, x, p)] = np.inf
         where = np.concatenate([np.flatnonzero(one & ~swap), np.flatnonzero(swap)])
         share[where] = result
     if none.any():
@@ -100,7 +100,7 @@ def gate_distance_ratio(
     return share
 
 
-def _may_be_oneself(
+def _may_be_seeing_platform(
     rules: MatchRules, ranged: LocalTracks, seen: LocalTracks, x: FloatArray, p: FloatArray
 ) -> BoolArray:
     """Return a mask: True where the track with a range may be the very platform whose sensor
@@ -112,7 +112,7 @@ def _may_be_oneself(
         return np.zeros(len(ranged), dtype=bool)
     on = np.unique(rules.platforms, return_inverse=True)[1]
     near = mahalanobis_squared(cholesky(p[:3, :3]), x[:3] - seen.own_m)
-    gate = gate_threshold(rules.gate_probability, 3)
+    gate = squared_gate_distance(rules.gate_probability, 3)
     return np.asarray((on[ranged.tracker] != on[seen.tracker]) & (near <= gate))
 
 
@@ -120,7 +120,8 @@ def _squared_bearing_distances(
     rules: MatchRules, one: LocalTracks, other: LocalTracks
 ) -> FloatArray:
     apart = residual(
-        np.stack(one.direction_in_frame_rad()), np.stack(other.direction_in_frame_rad())
+        np.stack(one.azimuth_elevation_in_frame_rad()),
+        np.stack(other.azimuth_elevation_in_frame_rad()),
     )
     turned = (rules.bearing_rate_rad_s * (one.time_s - other.time_s)) ** 2
     level = np.maximum(np.cos(one.elevation_rad) ** 2, 1e-12)
@@ -135,7 +136,9 @@ def _squared_bearing_distances(
 
 
 def leader_indices(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
-    """Return each fused track's leader (index), and for each track its fused track among them."""
+    """Return the index of each fused track's leading track, and for each track the place in that
+    array.
+    """
     order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
     replica, system = tracks.replica[order], tracks.system[order]
     first = np.ones(len(order), dtype=bool)
@@ -145,8 +148,12 @@ def leader_indices(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
     return order[first], of
 
 
-def drop_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> LocalTracks:
-    """Return the tracks, with fused track number 0 for those too far from their leader now."""
+def reset_numbers_of_strays(
+    rules: MatchRules, tracks: LocalTracks, time_s: FloatArray
+) -> LocalTracks:
+    """Return the tracks, where those now too far from their fused track's leader get number 0
+    (none).
+    """
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return tracks
@@ -163,7 +170,7 @@ def drop_strays(rules: MatchRules, tracks: LocalTracks, time_s: FloatArray) -> L
     return tracks.with_columns(system=system)
 
 
-def match_tracks(
+def assign_fused_numbers(
     rules: MatchRules,
     tracks: LocalTracks,
     time_s: FloatArray,
@@ -171,7 +178,8 @@ def match_tracks(
     next_number: IntArray,
     replica: IntArray,
 ) -> tuple[LocalTracks, IntArray]:
-    """Return the tracks with old or new fused track numbers, and each replica's next number.
+    """Return the tracks with a fused track number each, kept or new, and each replica's next free
+    number.
 
     Tracker by tracker, its tracks that belong nowhere, or stand alone, are assigned to the fused
     tracks that have none of it: the least sum of distances, none beyond its gate. One that stands
@@ -239,5 +247,5 @@ def _assign_to_fused_tracks(
     )
     inside = share <= 1.0
     candidate, which, share = candidate[inside], which[inside], share[inside]
-    won = global_nearest_pairs(which, candidate, share, 1.0)
+    won = least_total_pair_indices(which, candidate, share, 1.0)
     system[free[candidate[won]]] = tracks.system[lead[which[won]]]

@@ -13,12 +13,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from components.association.assignment import (
-    gate_threshold,
-    global_nearest_pairs,
+    greedy_pair_indices,
     is_only_pair_of_both,
-    nearest_pairs,
+    least_total_pair_indices,
+    squared_gate_distance,
 )
-from components.association.jpda import marginals
+from components.association.jpda import pair_probabilities
 from components.estimation.batched import is_everything, log_determinant_from_root, select_tracks
 from components.estimation.estimator import Estimates, mixture_innovation_squared
 from components.estimation.frame import SensorPose
@@ -86,7 +86,7 @@ class Candidates:
         """
         return np.concatenate(
             [
-                _log_volume(one)
+                _log_least_gate_volume(one)
                 + 2.0 * log_false_alarm_density(self.rules, one, self.sensor_masks)
                 + one.kind.size * _LOG_2_PI
                 for one in self.kinds
@@ -99,7 +99,7 @@ class Candidates:
         sizes = np.concatenate([np.full(len(one.track), one.kind.size) for one in self.kinds])
         limits = np.zeros(8)
         for many in range(2, 8):
-            limits[many] = gate_threshold(self.rules.p.gate_probability, many)
+            limits[many] = squared_gate_distance(self.rules.p.gate_probability, many)
         price = np.full(int(self.track.max()) + 1, -np.inf)
         np.maximum.at(price, self.track, limits[sizes] + self.log_volume_cost)
         return price[self.track]
@@ -109,7 +109,9 @@ class Association(Protocol):
     """Decides which detections belong to which tracks."""
 
     def update(self, pairs: Candidates) -> Associated:
-        """Return tracks updated with detections in gates, mask of tracks hit, and gain of score."""
+        """Return the tracks updated by detections in gates, a mask of tracks hit, and the gains of
+        their score.
+        """
         ...
 
 
@@ -170,7 +172,7 @@ class Nearest(OneToOne):
 
     def taken(self, pairs: Candidates) -> IntArray:
         """Return the pairs chosen by repeatedly taking the nearest remaining pair (indices)."""
-        return nearest_pairs(pairs.track, pairs.detection, pairs.distance)
+        return greedy_pair_indices(pairs.track, pairs.detection, pairs.distance)
 
 
 class GlobalNearest(OneToOne):
@@ -179,7 +181,9 @@ class GlobalNearest(OneToOne):
     def taken(self, pairs: Candidates) -> IntArray:
         """Return the indices of the pairs chosen so that the sum of their costs is least."""
         cost = pairs.distance + pairs.log_volume_cost
-        return global_nearest_pairs(pairs.track, pairs.detection, cost, pairs.cost_of_no_detection)
+        return least_total_pair_indices(
+            pairs.track, pairs.detection, cost, pairs.cost_of_no_detection
+        )
 
 
 class JointProbabilistic(Association):
@@ -201,7 +205,7 @@ class JointProbabilistic(Association):
         logs = np.concatenate([log_score_gain(rules, part, one, sensors) for one in kinds])
         missing = np.log1p(-rules.p.detection_probability * rules.p.gate_probability)
         weight = np.exp(np.minimum(logs - missing, _LARGEST_LOG))
-        share = marginals(track, entry, weight, rules.p.jpda_exact_detections)
+        share = pair_probabilities(track, entry, weight, rules.p.jpda_exact_detections)
         taken = np.bincount(track, weights=share, minlength=count)
         missed = np.maximum(1.0 - taken, 0.0)
         gain = missing + np.log1p(np.bincount(track, weights=weight, minlength=count))
@@ -334,7 +338,9 @@ def iterate_far_updates(
 def rotate_coarse_updates(
     part: TrackStore, track: IntArray, own_m_s: FloatArray, pose: SensorPose, estimates: Estimates
 ) -> None:
-    """Turn, in place, coarse-bearing updates about the sensor; not tracks with NaN `own_m_s`."""
+    """Replace, in place, updates by coarse bearings by turns about the sensor; none where `own_m_s`
+    is NaN.
+    """
     coarse = np.flatnonzero(~np.isnan(own_m_s[0]))
     if not len(coarse):
         return
@@ -371,8 +377,10 @@ def concatenate(parts: Sequence[Any]) -> Any:
     return parts[0] if len(parts) == 1 else np.concatenate(parts)
 
 
-def _log_volume(one: GatedPairs) -> FloatArray:
-    """Return ln |S| of every pair; of several models the least, whose gate is the tightest."""
+def _log_least_gate_volume(one: GatedPairs) -> FloatArray:
+    """Return, per pair, ln |S| of the innovation covariance S; the least of several motion
+    models.
+    """
     result = log_determinant_from_root(one.measured.innovations[0].root)
     for other in one.measured.innovations[1:]:
         result = np.minimum(result, log_determinant_from_root(other.root))

@@ -18,7 +18,7 @@ from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component, Input, NonNegativeRational, Output, Parameters
 from dsa_des.block.message import offsets_from_entry_rows
 from dsa_des.block.wake import Wake
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 
 
 class CueParameters(Parameters):
@@ -152,7 +152,7 @@ class Cues(Component):
         kept = half <= math.radians(self.p.most_half_angle_deg)
         row = tracks.row_of_entries[entry]
         run = tracks.run[row]
-        self._wide = add_cases(self._wide, run[~kept], run)
+        self._wide = counts_with_cases_added(self._wide, run[~kept], run)
         return row[kept], entry[kept], half[kept]
 
     def _message(

@@ -63,7 +63,9 @@ class Promises:
         return any(self.steps)
 
     def promised_ticks(self, sensor: int, range_m: FloatArray) -> FloatArray:
-        """Return a sensor's promised time to report ranges again, ticks; 0 means every look."""
+        """Return in how many ticks a sensor promises to report a target at each range again; 0: at
+        every look.
+        """
         if not (steps := self.steps[sensor]):
             return np.zeros(len(range_m))
         far, within_s = np.array(steps).T
@@ -71,7 +73,9 @@ class Promises:
         return np.asarray(within_s[step] * self.ticks_per_s)
 
     def track_life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
-        """Return the ticks each track lives undetected; `sees` (sensors, n) is True where seen."""
+        """Return how many ticks tracks live undetected; `sees` (sensors, n) is True where a sensor
+        sees one.
+        """
         life = np.full(len(range_m), int(LIVES_S * self.ticks_per_s))
         if not self:
             return life
@@ -83,9 +87,9 @@ class Promises:
         return np.maximum(life, soonest.astype(np.int64))
 
 
-def find_seeing_sensors(misdetections: IntArray) -> BoolArray:
-    """Return a mask (sensors, tracks): True where the sensor is taken to see the track, by how few
-    of its looks missed it.
+def is_seen_by_sensor(misdetections: IntArray) -> BoolArray:
+    """Return a mask (sensors, tracks): True where a sensor missed a track rarely, or least of all
+    sensors.
     """
     return np.asarray(
         (misdetections < BLIND_AFTER)
@@ -114,7 +118,7 @@ def is_detection_expected(
     if used == 0:
         return looked
     mine = sensors[of]
-    sees = find_seeing_sensors(part.misdetections)
+    sees = is_seen_by_sensor(part.misdetections)
     where: tuple[FloatArray, FloatArray, FloatArray] | None = None
     for i, field in enumerate(fields):
         if not used >> i & 1:
@@ -210,7 +214,8 @@ class Silence:
     def end_silent_tracks(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray
     ) -> tuple[TrackStore, list[TrackStore]]:
-        """Return tracks that stay alive, and ending runs' reports, with the ended ones deleted.
+        """Return the tracks that live on, and tables to report of runs where any ended, those as
+        deleted.
 
         Looked through are the tracks of the runs of `records`, at silent rows of each from `first`
         to `last`.

@@ -97,7 +97,7 @@ class InteractingParameters(TrackerParameters):
     )
 
     @model_validator(mode="after")
-    def _square(self) -> Any:
+    def _check_models_and_rates(self) -> Any:
         if len(set(self.models)) < len(self.models):
             raise ValueError(f"models = {list(self.models)} names one twice; allowed: each once")
         rates, many = self.transition_rates_per_s, len(self.models)

@@ -5,7 +5,7 @@ from itertools import pairwise, product
 
 import numpy as np
 
-from components.association.assignment import gate_threshold
+from components.association.assignment import squared_gate_distance
 from components.estimation.batched import select_tracks
 from components.estimation.estimator import PairMeasurement, log_mixture, pair_measurement
 from components.estimation.frame import SensorPose
@@ -88,7 +88,9 @@ def gate_pairs(
             direction = moments[0].expected[:2] if moments[0].left_over is None else None
             # The box of a kind that tells of errors is not about its gate, and decides itself.
             few = 0 if code & TELLS else _FEW_PAIRS
-            track, entry = _pairs_near(rules, kind, rows, moments, of, batch, mine, spread, few)
+            track, entry = _track_detection_pairs_in_boxes(
+                rules, kind, rows, moments, of, batch, mine, spread, few
+            )
             if ranged is not None:
                 chosen = part.ranged[track] == ranged
                 track, entry = track[chosen], entry[chosen]
@@ -109,11 +111,11 @@ def gate_pairs(
                 measured[:2], level_pose = angles_in_level_axes(measured[:2], pose.take(track))
                 mine_then = part.take(track)
                 since = np.maximum(mine_then.tick - mine_then.updated_tick, 0) / rules.ticks_per_s
-                ages = rules.carried.report_ages(scans, cells, since)
+                ages = rules.carried.position_and_velocity_ages(scans, cells, since)
                 foreseen = [
                     replace(
                         ages.add_age_errors(result, model, state, covariance),
-                        considered=reported.considered_components,
+                        considered=reported.uncorrected_components,
                     )
                     for result, model, state, covariance in zip(
                         estimator.expect(kind, mine_then.estimates(), level_pose, reported),
@@ -135,11 +137,13 @@ def gate_pairs(
                     ),
                     part.weights,
                 )  # fmt: skip
-            gated = pairs.distance <= gate_threshold(rules.p.gate_probability, kind.size)
+            gated = pairs.distance <= squared_gate_distance(rules.p.gate_probability, kind.size)
             held[entry[gated]] = True
             if not gated.all():
                 settled = (part.status == CONFIRMED) | (part.status == COASTED)
-                near = pairs.distance <= gate_threshold(rules.widest_gate_probability, kind.size)
+                near = pairs.distance <= squared_gate_distance(
+                    rules.widest_gate_probability, kind.size
+                )
                 held[entry[near & settled[track]]] = True
             (inside,) = gated.nonzero()
             cells = cells[inside]
@@ -154,7 +158,7 @@ def gate_pairs(
     return kinds, direction, held
 
 
-def _pairs_near(
+def _track_detection_pairs_in_boxes(
     rules: TrackerRules,
     kind: Kind,
     rows: list[int],
@@ -165,7 +169,8 @@ def _pairs_near(
     spread: "_PairVariance",
     few: int,
 ) -> tuple[IntArray, IntArray]:
-    """Return track and detection indices of a look's pairs in angle and range boxes at gates.
+    """Return track and detection indices of pairs where the detection lies in the box around the
+    gate.
 
     Up to so `few` pairs are all returned.
     """
@@ -174,9 +179,9 @@ def _pairs_near(
     many, first = counts[look], (counts.cumsum() - counts)[look]
     so_far = many.cumsum()
     if so_far[-1] <= few:
-        entry, track = _enumerate_pairs(many, first)
+        entry, track = _entry_and_track_pairs(many, first)
         return track, mine[entry]
-    threshold = gate_threshold(rules.widest_gate_probability, kind.size)
+    threshold = squared_gate_distance(rules.widest_gate_probability, kind.size)
     cells = batch.detection[mine]
     measured = _values_at(batch.scans.measured, rows[:3], cells)
     variance = _values_at(batch.scans.variance, rows[:3], cells)
@@ -185,7 +190,7 @@ def _pairs_near(
     # In clutter there are more pairs than fit into memory at once.
     part = so_far // _MOST_PAIRS
     for begin, end in _bounds_of_equal_runs(part):
-        entry, track = _enumerate_pairs(many[begin:end], first[begin:end])
+        entry, track = _entry_and_track_pairs(many[begin:end], first[begin:end])
         entry += begin
         kept = [_pairs_in_gate_boxes(*box, measured, entry, track) for box in boxes]
         near = kept[0] if len(kept) == 1 else np.unique(np.concatenate(kept))
@@ -196,8 +201,10 @@ def _pairs_near(
     return np.concatenate(tracks), np.concatenate(entries)
 
 
-def _enumerate_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
-    """Return all pairs' entry and track index, from each entry's number of tracks and the first."""
+def _entry_and_track_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
+    """Return entry and track indices of all pairs: entry i with `many[i]` tracks from `first[i]`
+    on.
+    """
     entry = np.arange(len(many)).repeat(many)
     before = many.cumsum() - many
     return entry, np.arange(len(entry)) - (before - first).repeat(many)

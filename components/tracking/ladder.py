@@ -49,7 +49,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     mine = track[np.arange(len(entry)) - np.repeat(start - first, many)]
     if len(entry) == 0:
         return errors
-    error, back_s = _track_errors(fused, entry, tracks, mine, wake)
+    error, back_s = _position_errors_and_lags(fused, entry, tracks, mine, wake)
     distance = np.sqrt((error**2).sum(axis=0))
     # The nearest of each entry's tracks, the first of equals.
     order = np.lexsort((distance, entry))
@@ -66,7 +66,7 @@ def measure(block: Component, wake: Wake, reference: Component) -> dict[str, Any
     return errors
 
 
-def _track_errors(
+def _position_errors_and_lags(
     fused: FusedDetections, entry: IntArray, tracks: StateTracks, mine: IntArray, wake: Wake
 ) -> tuple[FloatArray, FloatArray]:
     """Return track minus true position (3, pairs), m, when measured, and the time moved back, s."""
@@ -84,9 +84,11 @@ def _track_errors(
     return position - back_s * velocity - truth_m, np.abs(back_s)
 
 
-def truth(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return position error and NEES at chosen (row, target) cells of the reference, in whose
-    sensors' measurements lies part of the error.
+def errors_at_reference_cells(
+    block: Component, wake: Wake, cells: IntArray
+) -> dict[str, FloatArray]:
+    """Return, by name, position error (m) and NEES of the block's own tracks at (row, target)
+    cells.
     """
     row, target = cells.T
     return {name: values[row, target] for name, values in measure(block, wake, block).items()}
@@ -111,7 +113,7 @@ FILTER = Ladder(
     "imm",
     _QUANTITIES,
     measure,
-    truth,
+    errors_at_reference_cells,
 )  # fmt: skip
 
 ASSOCIATION = Ladder(
@@ -124,7 +126,7 @@ ASSOCIATION = Ladder(
     "jpda",
     _QUANTITIES,
     measure,
-    truth,
+    errors_at_reference_cells,
 )
 
 LATENESS = Ladder(
@@ -137,7 +139,7 @@ LATENESS = Ladder(
     "rerun",
     _QUANTITIES,
     measure,
-    truth,
+    errors_at_reference_cells,
 )
 
 #: Of every tracker that estimates states.

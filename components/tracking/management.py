@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from components.estimation.batched import (
+    matrix_product,
     multiply_by_transpose,
-    product,
     select_tracks,
-    symmetric,
+    symmetrised,
 )
 from components.estimation.estimator import Estimates
 from components.estimation.frame import SensorPose
@@ -69,7 +69,7 @@ def _masks_confirmed_and_hopeless(
         # What cannot come to m hits any more within its first n looks is dropped.
         left = p.confirm_n - np.minimum(looks, p.confirm_n)
         return hits >= p.confirm_m, hits + left < p.confirm_m
-    gained = score - rules.start_score
+    gained = score - rules.initial_track_score
     low = np.log(p.missed_confirmation / (1.0 - p.false_confirmation))
     high = np.log((1.0 - p.missed_confirmation) / p.false_confirmation)
     return gained >= high, gained <= low
@@ -121,7 +121,7 @@ def initiate_tracks(
         looks=whole,
         misses=0 * whole,
         status=np.full(count, TENTATIVE),
-        score=rules.start_score * ones,
+        score=rules.initial_track_score * ones,
         contributors=mask,
         updated_by=mask,
         ranged=ranged,
@@ -137,7 +137,7 @@ def initiate_tracks(
     status = judge_status(rules, born.status, born.history, born.looks, born.misses, born.score)
     born = born.with_columns(
         status=status,
-        updated_m2=position_variance_m2(born),
+        updated_m2=summed_position_variance_m2(born),
         **last_seen_columns(rules, born, pose, mask),
     )
     return born, next_number + counts
@@ -164,7 +164,7 @@ def start_estimates(
         measured[1] = np.where(steep, np.copysign(_STEEPEST_RAD, measured[1]), measured[1])
         jacobian = position_and_jacobian(measured, pose)[1]
     spread = np.zeros((6, 6, count))
-    spread[:3, :3] = multiply_by_transpose(product(jacobian, _diagonal(variance)), jacobian)
+    spread[:3, :3] = multiply_by_transpose(matrix_product(jacobian, _diagonal(variance)), jacobian)
     spread[:3, :3] = 0.5 * (spread[:3, :3] + spread[:3, :3].swapaxes(0, 1))
     for i in range(3, 6):
         spread[i, i] = rules.p.start_speed_m_s**2
@@ -181,7 +181,7 @@ def start_estimates(
             covariance[i, i] = (
                 rules.initial_extra_state_deviation(size - rules.estimator.error_count) ** 2
             )
-        _update_by_rates(scans, pose, codes, detection, state, covariance)
+        _update_by_range_rates(scans, pose, codes, detection, state, covariance)
         states.append(state)
         covariances.append(covariance)
     return Estimates(states, covariances, np.full((len(sizes), count), 1.0 / len(sizes)))
@@ -196,7 +196,7 @@ def _ownship_velocity_at_coarse_bearings(
     return np.where(codes & TELLS > 0, rules.carried.ownship_velocity_m_s(scans, detection), np.nan)
 
 
-def manage_tracks(
+def update_history_score_status(
     rules: TrackerRules,
     part: TrackStore,
     changed: TrackStore,
@@ -220,7 +220,7 @@ def manage_tracks(
     score = np.minimum(np.maximum(part.score + gain, -LARGEST_SCORE), LARGEST_SCORE)
     status = judge_status(rules, part.status, history, count, misses, score)
     updated_tick = np.where(hit, changed.tick, changed.updated_tick)
-    spread_m2, life_ticks = position_variance_m2(changed), part.life_ticks
+    spread_m2, life_ticks = summed_position_variance_m2(changed), part.life_ticks
     updated_m2 = np.where(hit, spread_m2, part.updated_m2)
     ended = changed.ranged & (spread_m2 - updated_m2 > rules.p.delete_above_m**2)
     counted_tick = part.counted_tick
@@ -243,7 +243,7 @@ def manage_tracks(
     )  # fmt: skip
 
 
-def position_variance_m2(part: TrackStore, *, late: bool = False) -> FloatArray:
+def summed_position_variance_m2(part: TrackStore, *, late: bool = False) -> FloatArray:
     """Return each track's summed position variance, m²; ValueError if a covariance is singular.
 
     `late` says that the tracks were taken back to a late look, for what an error advises.
@@ -276,7 +276,8 @@ def _advise_on_late_looks(late: bool) -> str:
 def last_seen_columns(
     rules: TrackerRules, part: TrackStore, pose: SensorPose, mask: IntArray
 ) -> dict[str, Any]:
-    """Return the columns of each track's last view by sensor, updated for sensors in a bit mask.
+    """Return columns of where and when each sensor last saw each track, updated for sensors in
+    `mask`.
 
     Nothing is kept of sensors all of whose errors are new.
     """
@@ -290,7 +291,7 @@ def last_seen_columns(
     }
 
 
-def _update_by_rates(
+def _update_by_range_rates(
     scans: Scans,
     pose: SensorPose,
     codes: IntArray,
@@ -350,14 +351,14 @@ def _initial_states_and_covariances(
     for i in (3, 4, 5):
         own[i, i] = np.where(codes[telling] & 4, white[i], own[i, i])
     own[:3, :3] = _diagonal(white[:3])
-    ages = rules.carried.report_ages(scans, cells, np.zeros(len(cells)))
+    ages = rules.carried.position_and_velocity_ages(scans, cells, np.zeros(len(cells)))
     own += multiply_by_transpose(effects, effects)
     speeds = np.stack([own[i, i] for i in (3, 4, 5)])
     for model in rules.estimator.models:
         own += ages.error_covariances(model, np.zeros((model.size, len(cells))), speeds)[0] / len(
             rules.estimator.models
         )
-    covariance[:6, :6, telling] = symmetric(own)
+    covariance[:6, :6, telling] = symmetrised(own)
     covariance[:6, 6:, telling] = -effects
     covariance[6:, :6, telling] = -effects.swapaxes(0, 1)
     return state, covariance

@@ -26,7 +26,7 @@ from components.tracking.track_store import TrackStore
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, IntArray
 from dsa_des.block.component import Producer
-from dsa_des.record.failure_counts import NO_COUNTS, add_cases
+from dsa_des.record.failure_counts import NO_COUNTS, counts_with_cases_added
 from dsa_des.time.clock import ClockSpec
 
 
@@ -149,7 +149,7 @@ def plan_without_late_looks(scans: Scans, of: IntArray, newest: IntArray) -> tup
     """Return the plan of steps in order of arrival, and the looks left out because a newer one of
     their replica came first.
     """
-    so_far = RunTicks(of, scans.tick).running_latest().tick
+    so_far = RunTicks(of, scans.tick).running_largest_tick().tick
     keep = (scans.tick >= so_far) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)
     none = np.full(len(look), -1)
@@ -251,7 +251,7 @@ class LookCount:
 
         return LookCount(
             {
-                name: add_cases(
+                name: counts_with_cases_added(
                     self.counts.get(name, NO_COUNTS), runs_of(left_out, i), runs_of(came, i)
                 )
                 for i, name in enumerate(sensors)

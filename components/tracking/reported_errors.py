@@ -113,14 +113,20 @@ class CarriedErrors:
         return scans.reported[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
 
     def new_error_variances(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
-        """Return detections' variances of new errors; for a position equal on all axes, m²."""
+        """Return variances of the errors new at each look; the first three rows: of position,
+        equal, in m².
+        """
         assert scans.reported is not None
         variance = scans.variance[rows][:, cells]
         variance[:3] = scans.reported[TOLD.index("white_variance"), cells]
         return np.asarray(variance)
 
-    def report_ages(self, scans: Scans, cells: IntArray, since_s: FloatArray) -> Ages:
-        """Return position and velocity ages in detections, beside time since track updates."""
+    def position_and_velocity_ages(
+        self, scans: Scans, cells: IntArray, since_s: FloatArray
+    ) -> Ages:
+        """Return ages of reported positions and velocities, times since track updates, and
+        positions' lag, s.
+        """
         assert scans.reported is not None
         position, velocity, late = (scans.reported[TOLD.index(name), cells] for name in _AGES)
         return Ages(position, velocity, since_s, late)

@@ -91,22 +91,29 @@ class LastingErrors:
         since_s: FloatArray,
         range_m: FloatArray,
     ) -> FloatArray:
-        """Return each measurement error's covariance with its sensor's last on that track."""
+        """Return covariances of errors with those of the same sensor's last measurement of the same
+        track.
+        """
         at = _OF_ROW[rows][:, np.newaxis] * self.step.shape[1] + source
         step, seen = self.step.take(at), np.isfinite(since_s)
         rounding = step * step / 12.0
         white, remembered = variance - rounding, 0.0
         if len(self.variance):
-            lasting = _take_cells(self.variance, at)
+            lasting = _values_at_flat_positions(self.variance, at)
             if self._has_crosswise_parts:
-                lasting = lasting + _take_cells(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
+                lasting = (
+                    lasting
+                    + _values_at_flat_positions(self.across_m2, at) / np.maximum(range_m, 1.0) ** 2
+                )
             if self._has_share_parts:
-                share = _take_cells(self.share, at)
+                share = _values_at_flat_positions(self.share, at)
                 stated = np.maximum(lasting + share * variance, 0.0)
                 lasting = np.where(share > 0.0, stated, lasting)
             white = white - lasting.sum(axis=0)
             # Time over an infinite time constant is 0: nothing is forgotten.
-            forgotten = np.exp(-np.where(seen, since_s, 0.0) / _take_cells(self.lasts_s, at))
+            forgotten = np.exp(
+                -np.where(seen, since_s, 0.0) / _values_at_flat_positions(self.lasts_s, at)
+            )
             remembered = (lasting * forgotten).sum(axis=0)
         safe = np.where(step > 0.0, step, 1.0)
         white = np.maximum(white, 0.0)
@@ -116,7 +123,7 @@ class LastingErrors:
         return np.where(seen, rounding + remembered, 0.0)
 
 
-def _take_cells(values: FloatArray, at: IntArray) -> FloatArray:
+def _values_at_flat_positions(values: FloatArray, at: IntArray) -> FloatArray:
     """Return values (parts, quantities, sensors) at flat positions in the last two axes."""
     return values.reshape(len(values), values[0].size).take(at, axis=1)
 
@@ -303,7 +310,7 @@ class TrackerRules:
         )
         assumed = p.assumed_range_m or 0.25 * farthest
         unstated = [o.unstated_across_m2 if isinstance(o, SensorOffer) else 0.0 for o in known]
-        used = [not range_rate_refusal(p, offer) for offer in known]
+        used = [not why_range_rates_unused(p, offer) for offer in known]
         return cls(
             p, estimator, ticks_per_s, fields, log_false_alarm_densities(fields,
             p.false_alarms_per_scan),
@@ -314,7 +321,7 @@ class TrackerRules:
         )  # fmt: skip
 
     @property
-    def start_score(self) -> float:
+    def initial_track_score(self) -> float:
         """Initial score of a track: log odds that a first detection is of a target."""
         return math.log(self.p.start_existence / (1.0 - self.p.start_existence))
 
@@ -329,7 +336,9 @@ class TrackerRules:
         return int(LIVES_S * self.ticks_per_s)
 
     def track_life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
-        """Return the ticks each track lives undetected; `sees` (sensors, n) is True where seen."""
+        """Return how many ticks tracks live undetected; `sees` (sensors, n) is True where a sensor
+        sees one.
+        """
         if self.p.delete_after_s is not None:
             return np.full(len(range_m), int(self.p.delete_after_s * self.ticks_per_s))
         return self.promises.track_life_ticks(sees, range_m)
@@ -343,7 +352,7 @@ class TrackerRules:
         return float(getattr(self.p, "start_acceleration_m_s2", 3.0))
 
 
-def range_rate_refusal(p: TrackerParameters, offer: Any) -> str:
+def why_range_rates_unused(p: TrackerParameters, offer: Any) -> str:
     """Return why this sensor's range rates are not used; an empty string if they are."""
     if not p.use_range_rate:
         return "use_range_rate is false"

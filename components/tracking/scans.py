@@ -54,7 +54,7 @@ class Scans:
     def __len__(self) -> int:
         return len(self.row)
 
-    def detection_kinds(self, rates_of: int, carries: bool) -> IntArray:
+    def detection_kind_codes(self, rates_of: int, carries: bool) -> IntArray:
         """Return the kind of each detection as an integer code.
 
         It is 1 with a range, 2 more with a range rate, 4 with a velocity, and `TELLS` with errors
@@ -77,7 +77,7 @@ class Scans:
         code = np.where(errs | moves, code & 1, code)
         return code + 4 * (moves & (tells | ~errs)) + TELLS * tells
 
-    def rotate_to_frame(self, origin_deg_m: FloatArray) -> Self:
+    def rotate_velocities_to_frames(self, origin_deg_m: FloatArray) -> Self:
         """Return looks with target velocities turned to the axes of frames at given origins."""
         if np.isnan(self.measured[4:]).all():
             return self
@@ -228,7 +228,7 @@ def looks_of_message(fused: FusedDetections) -> Scans:
         sensors=union,
         tells_misses=whole,
         pose=seen_from,
-        velocity=_velocities(fused, of_entry, count),
+        velocity=_ownship_velocities(fused, of_entry, count),
         offsets=np.concatenate(([0], np.cumsum(np.bincount(of_entry, minlength=count)))),
         measured=select_tracks(measured, entries),
         variance=select_tracks(variance, entries),
@@ -238,7 +238,7 @@ def looks_of_message(fused: FusedDetections) -> Scans:
     )
 
 
-def _velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArray:
+def _ownship_velocities(fused: FusedDetections, look: IntArray, count: int) -> FloatArray:
     """Return the ownship's velocity (3, looks), from a look's first detection with one, or NaN."""
     velocity = np.full((3, count), np.nan)
     if fused.own_velocity is not None:

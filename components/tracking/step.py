@@ -16,14 +16,18 @@ from components.messages.state_tracks import DELETED
 from components.tracking.association import Association, Candidates
 from components.tracking.due_detections import is_detection_expected
 from components.tracking.gating import gate_pairs
-from components.tracking.management import initiate_tracks, manage_tracks, position_variance_m2
+from components.tracking.management import (
+    initiate_tracks,
+    summed_position_variance_m2,
+    update_history_score_status,
+)
 from components.tracking.rules import TrackerRules
 from components.tracking.scans import LookBatch
 from components.tracking.track_store import TrackStore
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 
-def step(
+def tracks_after_looks(
     rules: TrackerRules,
     association: Association,
     store: TrackStore,
@@ -82,10 +86,10 @@ def associate_looks(
     looked = is_detection_expected(rules.fields, rules.promises, part, of, batch, pose, direction)
     pairs = Candidates(rules, part, kinds, batch, pose)
     changed, hit, gain = association.update(pairs)
-    return manage_tracks(rules, part, changed, pose, looked, hit, gain), held
+    return update_history_score_status(rules, part, changed, pose, looked, hit, gain), held
 
 
-def late_step(
+def tracks_after_late_looks(
     rules: TrackerRules,
     association: Association,
     store: TrackStore,
@@ -122,7 +126,7 @@ def late_step(
         ]
         back = [(one, *_retrodict(rules, now.take(one), old, tick[of][one])) for one, old in groups]
         for _, was, _, _ in back:
-            position_variance_m2(was, late=True)
+            summed_position_variance_m2(was, late=True)
         then = [
             predict_tracks(rules, now.take(~ahead), tick[of][~ahead]),
             *(one[1] for one in back),
@@ -136,7 +140,7 @@ def late_step(
             newer = now.updated_tick > tick[of]
             left_out[of[newer & (seen.updated_tick == tick[of])]] = True
             whole = _sort_tracks([whole.take(~newer), now.take(newer)])
-        position_variance_m2(whole, late=True)
+        summed_position_variance_m2(whole, late=True)
         parts.append(whole)
     if not held.all():
         new, next_number = initiate_tracks(rules, batch, ~held, next_number)
@@ -202,7 +206,7 @@ def _carry_forward(
             strict=True,
         )
     ]
-    weights = _weights_now(back, then.weights, seen.weights, now.weights)
+    weights = _corrected_model_probabilities(back, then.weights, seen.weights, now.weights)
     return seen.replace_estimates(
         Estimates([x for x, _ in moved], [p for _, p in moved], weights),
         tick=now.tick,
@@ -210,7 +214,7 @@ def _carry_forward(
     )
 
 
-def _weights_now(
+def _corrected_model_probabilities(
     back: FloatArray, then: FloatArray, seen: FloatArray, now: FloatArray
 ) -> FloatArray:
     """Return present model probabilities, corrected by how a late look changed the past ones."""

@@ -130,7 +130,9 @@ class TrackerStub(Component):
         entry = last[ends][row, at]
         now = {name: values[entry] for name, values in pool.items()}
         table = KeyedTable(replica=replica[ends][row], target=targets[at], **now)
-        self._held = self._held.replace_runs(replica[begins], table, wake.first_run)
+        self._held = self._held.replace_and_drop_earlier_runs(
+            replica[begins], table, wake.first_run
+        )
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
     def _target_measurements(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:

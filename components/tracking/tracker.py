@@ -36,9 +36,9 @@ from components.tracking.reported_errors import (
     latency_warnings,
     sensors_by_told_error,
 )
-from components.tracking.rules import TrackerParameters, TrackerRules, range_rate_refusal
+from components.tracking.rules import TrackerParameters, TrackerRules, why_range_rates_unused
 from components.tracking.scans import LookBatch, Scans, looks_of_message, split_due_looks
-from components.tracking.step import late_step, step
+from components.tracking.step import tracks_after_late_looks, tracks_after_looks
 from components.tracking.track_store import (
     TrackStore,
     initial_records,
@@ -207,7 +207,7 @@ class Tracker(Component):
             for name, offer in sorted(offers.items())
             if isinstance(offer, SensorOffer)
             and offer.measures_range_rate
-            and (why := range_rate_refusal(self.p, offer))
+            and (why := why_range_rates_unused(self.p, offer))
         ]
 
     def _empty_store(self, sensors: int) -> TrackStore:
@@ -271,8 +271,8 @@ class Tracker(Component):
         moves = scans.velocity if self.rules.rates_of else None
         origin = select_tracks(records.origin, of)
         poses = pose_in_frame(origin, scans.pose[:3], scans.pose[3:], moves)
-        codes = scans.detection_kinds(self.rules.rates_of, self.rules.carried is not None)
-        turned = scans.rotate_to_frame(origin)
+        codes = scans.detection_kind_codes(self.rules.rates_of, self.rules.carried is not None)
+        turned = scans.rotate_velocities_to_frames(origin)
         reported: list[TrackStore] = []
         reports = plan.is_reported_after
         # The row of the wake that each work is of.
@@ -298,7 +298,7 @@ class Tracker(Component):
                 of_late = plan.of[late]
                 replicas = records.replica[of_late]
                 old = tracks_before(before, plan.since[late].tolist(), replicas.tolist())
-                store, records.next_number[of_late], gone = late_step(
+                store, records.next_number[of_late], gone = tracks_after_late_looks(
                     self.rules, self._association, store, old,
                     LookBatch.from_looks(turned, plan.look[late], replicas, codes, poses),
                     records.next_number[of_late], unless_updated=self.p.late == "drop",
@@ -309,7 +309,7 @@ class Tracker(Component):
             if self._remembers:
                 store = self._restore_and_snapshot(store, records, plan, works_now, before)
             if len(looks):
-                store, records.next_number[mine] = step(
+                store, records.next_number[mine] = tracks_after_looks(
                     self.rules, self._association, store,
                     LookBatch.from_looks(turned, looks, records.replica[mine], codes, poses),
                     records.next_number[mine],
@@ -325,7 +325,9 @@ class Tracker(Component):
                 shown_last = shown_last.take(~of_shown)
             if len(told) and len(shown):
                 reported.append(tracks_to_report(told, records.take(plan.of[shown]), row[shown]))
-        self._records = self._records.replace_runs(records.replica, records, wake.first_run)
+        self._records = self._records.replace_and_drop_earlier_runs(
+            records.replica, records, wake.first_run
+        )
         self._store = store
         if self._remembers:
             self._past = Past.from_looks(scans, kept, before, waiting)
@@ -371,6 +373,8 @@ class Tracker(Component):
         return store
 
     def report(self) -> dict[str, Any]:
-        """Return how many looks came too late, by sensor, and how many before their instant."""
+        """Return late looks by sensor, and how many looks arrived before the instant they were
+        made.
+        """
         late = {self.name: self._count.late_look_statistics()}
         return {"late_looks": late, "early_looks": {self.name: self._early}}

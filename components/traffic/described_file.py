@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.recorded.traffic_of_files import clock
+from components.formats.recorded.traffic_of_files import instant_as_text
 from components.formats.text_rows import TrafficFile, TrafficFileError
 from components.traffic.files import FileTrafficParameters, read_selected_traffic
 from dsa_des.errors import UsageError
@@ -48,7 +48,7 @@ def describe_file(path: Path, content: TrafficFile) -> list[str]:
         for values in zip(*((c.lat_deg, c.lon_deg, c.alt_m) for c in aircraft), strict=True)
     ]
     away = sum(0 if craft.away is None else int(np.count_nonzero(craft.away)) for craft in aircraft)
-    begins, ends = (clock(content.start_time_s + time_s) for time_s in (first, last))
+    begins, ends = (instant_as_text(content.start_time_s + time_s) for time_s in (first, last))
     word = shell_line([str(path)])
     lines = [
         f"{path.name}: {content.kind}; {content.units}",

@@ -225,7 +225,9 @@ class FlownFlights:
 
     @property
     def traffic(self) -> object:
-        """The target fleet, as an identity that is the same for a traffic block's views."""
+        """The target fleet: the same object for all flights of one traffic block, and so its
+        identity.
+        """
         return self.targets
 
     @property
@@ -240,7 +242,7 @@ class FlownFlights:
         of_each = zip(self.platforms, count.tolist(), strict=True)
         return tuple(index for index, many in of_each if index >= 0 and many)
 
-    def seen_from(self, viewer: int) -> tuple[Fleet, Fleet]:
+    def viewer_and_target_fleets(self, viewer: int) -> tuple[Fleet, Fleet]:
         """Return the flights of a viewing platform, and those of all targets with the ownship in
         the viewer's place, both without manoeuvres.
         """
@@ -254,7 +256,7 @@ class FlownFlights:
         steered = {index: self.flights_of_platform(index) for index in self.steered_targets}
         return WithOthers(self.targets, self.targets_per_run, steered) if steered else self.targets
 
-    def platform_at(
+    def platform_states_at(
         self,
         platform: int,
         run: IntArray,
@@ -266,9 +268,11 @@ class FlownFlights:
         its first `known` manoeuvres or all; `state` gives them without wind if already computed.
         """
         place = self.platforms.index(platform)
-        return self._flown_at(run + place * self.runs if place else run, time_s, known, state)
+        return self._flown_states_at(
+            run + place * self.runs if place else run, time_s, known, state
+        )
 
-    def _flown_at(
+    def _flown_states_at(
         self,
         number: IntArray,
         time_s: FloatArray,
@@ -283,7 +287,7 @@ class FlownFlights:
             state = crabbing(state, speed_mps, fleet.fixed_attitudes_rad(number, time_s, known))
         return state
 
-    def targets_at(
+    def target_states_at(
         self,
         target: IntArray,
         time_s: FloatArray,
@@ -301,7 +305,7 @@ class FlownFlights:
         mine, left = place.nonzero()[0], (place == 0).nonzero()[0]
         place = place[mine]
         counts = None if known is None else known[mine, place]
-        flown = self._flown_at(place * self.runs + run[mine], time_s[mine], counts)
+        flown = self._flown_states_at(place * self.runs + run[mine], time_s[mine], counts)
         if not len(left):
             return flown
         known_of = None if state is None else state.taken(left)
@@ -318,7 +322,9 @@ class FlownFlights:
             state = crabbing(state, speed_mps, self.targets.fixed_attitudes_rad(target, time_s))
         return state
 
-    def compute_once(self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]) -> Any:
+    def compute_if_arrays_changed(
+        self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]
+    ) -> Any:
         """Return the value stored under a name if it was made for equal arrays, else call `make`
         and store its result in place of the last one.
 
@@ -349,8 +355,8 @@ class FlownFlights:
         if self.steered_targets:
             counts = np.broadcast_to(known, (*shape, known.shape[-1])).reshape(len(times), -1)
         key = target, times, known
-        others = self.compute_once(
-            "targets", key, lambda: self.targets_at(target, times, known=counts)
+        others = self.compute_if_arrays_changed(
+            "targets", key, lambda: self.target_states_at(target, times, known=counts)
         )
         mine = np.flatnonzero(np.broadcast_to(columns, shape).reshape(-1) == viewer)
         if len(mine) != time_s.size or viewer < 0:
@@ -360,7 +366,9 @@ class FlownFlights:
         if len(mine):  # the two have changed places
             counts = np.broadcast_to(known[..., 0], shape).reshape(-1)[mine]
             key = runs[mine], times[mine], counts
-            own = self.compute_once("own", key, lambda: self.platform_at(-1, *key))
+            own = self.compute_if_arrays_changed(
+                "own", key, lambda: self.platform_states_at(-1, *key)
+            )
             values = [part.copy() for part in others.arrays()]
             for part, new in zip(values, own.arrays(), strict=True):
                 part[mine] = new
@@ -370,7 +378,7 @@ class FlownFlights:
             hidden &= np.broadcast_to(columns, shape).reshape(-1) != viewer
             others = replace(others, present=others.present & ~hidden)
         if viewer in self.intervals:
-            near = self.intervals[viewer].holds(target, times, times)
+            near = self.intervals[viewer].may_be_near_throughout(target, times, times)
             others = replace(others, present=others.present & near)
         return looking, others.reshape(shape)
 
@@ -385,7 +393,7 @@ class FlownFlights:
     ) -> TrajectoryState:
         mine = known[..., self.platforms.index(viewer)]
         runs, counts = (np.broadcast_to(of, time_s.shape).reshape(-1) for of in (run, mine))
-        state = self.platform_at(viewer, runs, time_s.reshape(-1), counts)
+        state = self.platform_states_at(viewer, runs, time_s.reshape(-1), counts)
         return state.reshape(time_s.shape)
 
     def _last_publication_s(self, run: IntArray, time_s: FloatArray) -> FloatArray:

@@ -18,7 +18,7 @@ class Heights(Parameters):
         "flown where the air of `[weather]` has these pressures at the start.",
     )
 
-    def height_m(self, air: Air | None, altitude_m: Any) -> Any:
+    def height_above_ellipsoid_m(self, air: Air | None, altitude_m: Any) -> Any:
         """Return heights above the ellipsoid, m, by `heights`; unchanged if `air` is None.
 
         None is the standard's, in which they are the same numbers.
@@ -26,5 +26,5 @@ class Heights(Parameters):
         if air is None or self.heights == "geometric":
             return altitude_m
         if self.heights == "pressure":
-            return air.height_m(altitude_m)
+            return air.height_of_pressure_altitude_m(altitude_m)
         return altitude_m + air.geoid_m

@@ -44,12 +44,12 @@ class OverheadWire(Parameters):
         default=-20.0, description="Radar cross-section of each piece, dBsm (Table 2.3)."
     )
 
-    def piece_intruders(self) -> Iterator[dict[str, Any]]:
+    def piece_intruder_keys(self) -> Iterator[dict[str, Any]]:
         """Yield each piece of the wire as a dictionary of an intruder's keys: position, radar and
         laser properties, no camera areas.
         """
         posts = np.array([[post.east_m, post.north_m, post.up_m] for post in self.posts])
-        ends = [catenary(a, b, self.sag_m, self.piece_m) for a, b in pairwise(posts)]
+        ends = [catenary_points_m(a, b, self.sag_m, self.piece_m) for a, b in pairwise(posts)]
         spans = [(line[:-1], line[1:]) for line in ends]
         first, last = (np.concatenate(parts) for parts in zip(*spans, strict=True))
         if len(first) > _MOST_PIECES:
@@ -79,7 +79,9 @@ class OverheadWire(Parameters):
             }
 
 
-def catenary(first: FloatArray, last: FloatArray, sag_m: float, step_m: float) -> FloatArray:
+def catenary_points_m(
+    first: FloatArray, last: FloatArray, sag_m: float, step_m: float
+) -> FloatArray:
     """Return points (n, 3) east, north, up (m), in order, of a wire hanging between two posts.
 
     `sag_m` is its depth below the middle of the line between them, `step_m` the longest level

@@ -34,7 +34,7 @@ _MISSING = 0.02
 _RADIANS = ("latitude", 1.6, "longitude", 3.2)
 
 
-def describe_suspicions(aircraft: Sequence[SampledTrajectory]) -> list[str]:
+def implausible_motion_sentences(aircraft: Sequence[SampledTrajectory]) -> list[str]:
     """Return a sentence per kind of implausible motion, with its aircraft and likely wrong unit."""
     by_hint: dict[str, list[str]] = {}
     for craft in aircraft:
@@ -104,7 +104,9 @@ def _velocities(craft: SampledTrajectory) -> FloatArray:
     return np.asarray(np.stack(steps) / np.diff(craft.sample_times_s))
 
 
-def _coverage(own: Trajectory, others: Sequence[SampledTrajectory], duration_s: float) -> list[str]:
+def _short_presence_warnings(
+    own: Trajectory, others: Sequence[SampledTrajectory], duration_s: float
+) -> list[str]:
     """Return a warning if the ownship, or else others, are there for clearly less than the run."""
     lines = []
     first, last = own.interval_present()
@@ -214,7 +216,8 @@ class RecordedTraffic(TrafficSource):
             return content
         blows = (0.0, 0.0) if wind is None else (wind.east_mps, wind.north_mps)
         own, *intruders = (
-            craft.in_air(*blows, self.p.height_m(air, craft.alt_m)) for craft in content.aircraft
+            craft.with_attitude_in_wind(*blows, self.p.height_above_ellipsoid_m(air, craft.alt_m))
+            for craft in content.aircraft
         )
         return replace(content, ownship=own, intruders=intruders)
 
@@ -259,8 +262,8 @@ class RecordedTraffic(TrafficSource):
         duration_s = float(self.context.duration_s)
         lines = [
             *self.content.warnings, *self._pressure_altitude_warnings(),
-            *describe_suspicions(self.content.aircraft),
-            *_coverage(self.own, list(self.targets), duration_s),
+            *implausible_motion_sentences(self.content.aircraft),
+            *_short_presence_warnings(self.own, list(self.targets), duration_s),
         ]  # fmt: skip
         return [f"file {self.files_text()}: {line}" for line in lines]
 

@@ -75,7 +75,9 @@ class Flight(Heights):
         def replace_altitude(one: Any, key: str) -> Any:
             if getattr(one, key, None) is None:
                 return one
-            return one.model_copy(update={key: float(self.height_m(air, getattr(one, key)))})
+            return one.model_copy(
+                update={key: float(self.height_above_ellipsoid_m(air, getattr(one, key)))}
+            )
 
         legs = [
             leg.model_copy(
@@ -203,7 +205,7 @@ class ScriptedParameters(SourceParameters):
 
     def targets(self, terrain: Any) -> list[Intruder]:
         """Return all targets as intruders: intruders, pieces of wires, and sites (stationary)."""
-        pieces = [Intruder(**piece) for wire in self.wires for piece in wire.piece_intruders()]
+        pieces = [Intruder(**piece) for wire in self.wires for piece in wire.piece_intruder_keys()]
         sites = [site.to_intruder(self.ownship.start, terrain) for site in self.sites]
         return self.intruders + pieces + sites
 

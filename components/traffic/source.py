@@ -18,8 +18,8 @@ from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
     FlightAt,
     TrafficEnvelope,
+    check_above_raster_ground,
     check_above_terrain,
-    check_on_raster,
     traffic_envelope,
 )
 from components.flights.closest_approach import (
@@ -27,13 +27,13 @@ from components.flights.closest_approach import (
     RegularTimes,
     SampleTimes,
     approaches_of_run,
-    censoring_ends,
+    describe_censoring_ends,
 )
 from components.flights.fleet import Fleet, Trajectory
 from components.flights.many_flights import SteeredFlight, fleet_of
 from components.geometry import TrajectoryState
 from components.messages.known_flights import KnownFlights
-from components.messages.reach import farthest_look
+from components.messages.reach import combined_farthest_look
 from components.messages.steering import Manoeuvres
 from components.messages.targets import TrafficStates, TrueStates
 from components.traffic.flown_flights import FlightsOfRuns, FlownFlights, WithOthers
@@ -42,12 +42,12 @@ from components.traffic.steering import (
     Coming,
     add_due_manoeuvres,
     arrived_manoeuvres,
+    platform_index_by_steerer,
     split_due_manoeuvres,
-    steered_platforms,
 )
 from components.traffic.views import Seen, views_of_platforms
 from components.traffic.wind_effect import ATTITUDE
-from dsa_des.arrays.run_ticks import single_run_numbers
+from dsa_des.arrays.run_ticks import shared_zero_run_numbers
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component, Input, Output, Parameters, PositiveRational
 from dsa_des.block.message import Message
@@ -153,7 +153,7 @@ class TrafficSource(Component):
 
     def _envelope(self, reach_m: float, lasts_s: float, viewer: int) -> TrafficEnvelope:
         duration_s = float(self.context.duration_s) + lasts_s
-        flights = self._flights_of_this_run([viewer]).seen_from(viewer)
+        flights = self._flights_of_this_run([viewer]).viewer_and_target_fleets(viewer)
         envelope = traffic_envelope(flights[0][0], flights[1], duration_s, reach_m)
         weather = self.context.sections.get("weather")
         if weather is not None and weather.wind_mps > 0.0:
@@ -170,11 +170,15 @@ class TrafficSource(Component):
         """Learn who looks and is steered, and how far sensors look; what is beyond is not moved."""
         self._check_terrain(self.own.at)
         #: Which platform each block steers.
-        self._steers = steered_platforms(self.context.producers, self._target_index, self.unseen)
+        self._steers = platform_index_by_steerer(
+            self.context.producers, self._target_index, self.unseen
+        )
         asked: dict[int, list[Any]] = {-1: []}
         for consumer in self.context.consumers:
             asked.setdefault(self._target_index(consumer.platform), []).append(consumer.request)
-        self._looks = {viewer: farthest_look(requests) for viewer, requests in asked.items()}
+        self._looks = {
+            viewer: combined_farthest_look(requests) for viewer, requests in asked.items()
+        }
         #: Whether the truth is recorded.
         self.says_truth = is_truth_recorded(self.context, len(self.roster))
         self._set_flights_of_runs(
@@ -229,7 +233,7 @@ class TrafficSource(Component):
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(own_at, terrain.height_m, end_s)
         if terrain is not None and terrain.raster is not None:
-            check_on_raster(own_at, terrain.raster.raster, terrain.raster_zero_m, end_s)
+            check_above_raster_ground(own_at, terrain.raster.raster, terrain.raster_zero_m, end_s)
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -276,7 +280,7 @@ class TrafficSource(Component):
     @property
     def width(self) -> int:
         """Largest number of targets that are moved at one time."""
-        most = sum(view.most_at_once for view in self._views) + len(self._views) - 1
+        most = sum(view.max_near_targets_at_once for view in self._views) + len(self._views) - 1
         return min(most, len(self.roster))
 
     def skipped_work_notes(self) -> list[str]:
@@ -284,18 +288,18 @@ class TrafficSource(Component):
         return [
             view.culling_note(self.roster.names)
             for view in self._views
-            if view.may_leave_out_targets
+            if view.is_leaving_out_far_targets
         ]
 
     def run(self, wake: Wake) -> Message | None:
         """Return the state of all aircraft that may matter, at every instant."""
         # Flights that all runs share are those of one.
-        run = wake.run if self._flown.runs > 1 else single_run_numbers(len(wake))
+        run = wake.run if self._flown.runs > 1 else shared_zero_run_numbers(len(wake))
         time_s = wake.time_s
         known = self._apply_manoeuvres(wake, run)
         flown = self._flown
         seen = Seen(self._views, flown, run, time_s)
-        states = self._targets_at(run, seen.columns, time_s)
+        states = self._target_states_at(run, seen.columns, time_s)
         present, culled = seen.visible_to_ownship(states.present)
         others = seen.visible_to_other_platforms(states.present, self.roster.names)
         truth = replace(flown, intervals={}, rates_hz=None, unseen=()) if self.says_truth else None
@@ -338,14 +342,16 @@ class TrafficSource(Component):
             if view.epochs is not None:
                 mine = due.take(due.platform == view.viewer)
                 for run_of, tick in zip(mine.replica.tolist(), mine.tick.tolist(), strict=True):
-                    view.epochs.forget(run_of, tick / wake.ticks_per_s)
+                    view.epochs.forget_ranges_from(run_of, tick / wake.ticks_per_s)
         self._flown = replace(flown, fleet=fleet)
         assert isinstance(self.own, SteeredFlight)
         self.own = SteeredFlight(self.own.flight, fleet)
         self.targets = self._flown.flown_target_flights()
         return known
 
-    def _targets_at(self, run: IntArray, columns: IntArray, time_s: FloatArray) -> TrajectoryState:
+    def _target_states_at(
+        self, run: IntArray, columns: IntArray, time_s: FloatArray
+    ) -> TrajectoryState:
         """Return states (rows, columns) of the targets `columns`, for each row's run and time."""
         flown, shape = self._flown, (len(time_s), len(columns))
         state: TrajectoryState | None = None
@@ -357,11 +363,11 @@ class TrafficSource(Component):
                 return state
             state = state.reshape((-1,))
         each = (run[:, np.newaxis] * flown.targets_per_run + columns).reshape(-1)
-        return flown.targets_at(each, np.repeat(time_s, len(columns)), state).reshape(shape)
+        return flown.target_states_at(each, np.repeat(time_s, len(columns)), state).reshape(shape)
 
-    def own_at(self, time_s: FloatArray) -> TrajectoryState:
+    def own_states_at(self, time_s: FloatArray) -> TrajectoryState:
         """Return the ownship's states in run 0 at times (n,), with manoeuvres so far and wind."""
-        return self._flown.platform_at(-1, np.zeros(len(time_s), dtype=np.int64), time_s)
+        return self._flown.platform_states_at(-1, np.zeros(len(time_s), dtype=np.int64), time_s)
 
     def records(self) -> list[type[Message]]:
         """Return the types to record: traffic states; true ones if asked or the scene is small."""
@@ -393,9 +399,9 @@ class TrafficSource(Component):
                 targets, len(targets), {viewer: self._flown.flights_of_platform(-1)}
             )
         times = self._approach_search_times(end_s)
-        between = not self._has_sample_interval
+        between = not self._has_approach_search_interval
         best = approaches_of_run(own, targets, times, end_s, between=between)
-        where = censoring_ends(own, targets, times, best.time_s, end_s)
+        where = describe_censoring_ends(own, targets, times, best.time_s, end_s)
         closest = zip(names, best.time_s.tolist(), best.range_m.tolist(), where, strict=True)
         approaches = [
             (name, {"time_s": time_s, "range_m": range_m, **({"at": at} if at else {})})
@@ -408,13 +414,13 @@ class TrafficSource(Component):
         }
 
     @property
-    def _has_sample_interval(self) -> bool:
+    def _has_approach_search_interval(self) -> bool:
         """Return whether the scene sets the interval at which closest approaches are searched."""
         return hasattr(self.p, "sample_interval_s")
 
     def _approach_search_times(self, end_s: float) -> list[SampleTimes]:
         """Return the sets of times at which the closest-approach search compares distances."""
-        grid = [] if self._has_sample_interval else [RegularTimes(STEP_S, end_s)]
+        grid = [] if self._has_approach_search_interval else [RegularTimes(STEP_S, end_s)]
         return [*self.sample_times(), *grid]
 
 

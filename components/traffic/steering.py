@@ -16,7 +16,7 @@ from dsa_des.block.wake import Wake
 from dsa_des.time.clock import MAX_TICK
 
 
-def steered_platforms(
+def platform_index_by_steerer(
     producers: Sequence[Producer], index: Callable[[str], int], unseen: Collection[int]
 ) -> dict[str, int]:
     """Return, by name of the steering block, the index of the platform that it steers; ValueError

@@ -38,7 +38,7 @@ class View:
         self._steered = [viewer if one < 0 else one for one in steered or () if one != viewer]
         if math.isinf(look.range_m):
             return
-        own, others = flights.seen_from(viewer)
+        own, others = flights.viewer_and_target_fleets(viewer)
         if steered is None:
             self.reach_m = max_true_ranges_m(own, flights.targets_per_run, end_s, look)
             if not np.isinf(self.reach_m).all():
@@ -47,13 +47,13 @@ class View:
             self.epochs = SteeredCulling(own, others, look.range_m, end_s)
 
     @property
-    def most_at_once(self) -> int:
+    def max_near_targets_at_once(self) -> int:
         """Largest number of targets that can be near this platform at one time."""
-        return self._width if self.intervals is None else self.intervals.most_at_once()
+        return self._width if self.intervals is None else self.intervals.max_near_targets_at_once()
 
     @property
-    def may_leave_out_targets(self) -> bool:
-        """Return whether far targets are left out for this platform."""
+    def is_leaving_out_far_targets(self) -> bool:
+        """Return whether targets too far for this platform's sensors are left out, not moved."""
         return self.intervals is not None or self.epochs is not None
 
     def culling_note(self, names: Sequence[str]) -> str:
@@ -73,7 +73,7 @@ class View:
         every, lasts_s, one_run = np.arange(self._width), self.look.lasts_s, flown.runs == 1
         if self.epochs is not None:
             looking = flown.flights_of_platform(self.viewer)
-            state, near = self.epochs.states_and_near(looking, run, time_s)
+            state, near = self.epochs.own_states_and_near_mask(looking, run, time_s)
             near[:, self._steered] = True
             columns = np.flatnonzero(near.any(axis=0)) if one_run else every
             return self._ownship_states(flown, run, time_s, state), columns, near[:, columns]
@@ -87,7 +87,7 @@ class View:
             return own, columns, self.intervals.may_be_near(columns, time_s, lasts_s)
         each = (run[:, np.newaxis] * flown.targets_per_run + every).reshape(-1)
         times = np.repeat(time_s, len(every))
-        near = self.intervals.holds(each, times, times + lasts_s)
+        near = self.intervals.may_be_near_throughout(each, times, times + lasts_s)
         return own, every, near.reshape(len(time_s), len(every))
 
     def _ownship_states(
@@ -98,7 +98,7 @@ class View:
         state: TrajectoryState | None = None,
     ) -> TrajectoryState | None:
         """Return the ownship's states at the rows if the ownship is the viewer, else None."""
-        return flown.platform_at(-1, run, time_s, state=state) if self.viewer < 0 else None
+        return flown.platform_states_at(-1, run, time_s, state=state) if self.viewer < 0 else None
 
 
 def views_of_platforms(

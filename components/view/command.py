@@ -20,6 +20,6 @@ def view(**options: Any) -> None:
     RUN is a run's folder or a .daa file; two or three stand beside each other on one clock. The
     page holds all its data and asks for nothing else; it opens from disk.
     """
-    from components.view.make_view import make_view
+    from components.view.make_view import write_view_page
 
-    make_view(**options)
+    write_view_page(**options)

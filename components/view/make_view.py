@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from components.display.recorded_run import scene_hint
-from components.view.page import RunPicture, page_of_several, page_text
+from components.display.recorded_run import hint_for_shipped_scene
+from components.view.page import RunPicture, page_html, page_html_of_several
 from components.view.run_picture import encounter_picture, run_picture
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import check_file_writable, write_file
@@ -16,19 +16,19 @@ from dsa_des.terminal.terminal import say
 _MOST = 3
 
 
-def make_view(runs: tuple[str, ...], out: str | None, platform: str | None) -> None:
+def write_view_page(runs: tuple[str, ...], out: str | None, platform: str | None) -> None:
     """Write an HTML page showing run folders or ``.daa`` files; the command ``dsa-des view``."""
     if len(runs) > _MOST:
         raise UsageError(f"{len(runs)} runs: at most {_MOST} stand beside each other")
     pictures = [_picture_of_source(Path(run), platform) for run in runs]
     if len(pictures) == 1:
-        page = page_text(pictures[0])
+        page = page_html(pictures[0])
     else:
         for run, picture in zip(runs, pictures, strict=True):
             name = Path(run).resolve().name
             if picture.title != name:
                 picture.title = f"{name}: {picture.title}"
-        page = page_of_several(pictures)
+        page = page_html_of_several(pictures)
     target = _default_page_path(runs) if out is None else user_path(out)
     check_file_writable(target)
     try:
@@ -61,4 +61,6 @@ def _picture_of_source(source: Path, platform: str | None) -> RunPicture:
         return encounter_picture(source)
     if source.exists():
         raise UsageError(f"{source}: is neither a run's folder nor a .daa file")
-    raise UsageError(f"{source}: there is no such folder or file{scene_hint(str(source))}")
+    raise UsageError(
+        f"{source}: there is no such folder or file{hint_for_shipped_scene(str(source))}"
+    )

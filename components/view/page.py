@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 _PACKAGE = "components.view"
 #: The program's parts, in the order in which they need each other.
@@ -67,7 +67,7 @@ def _encode_column(name: str, values: AnyArray) -> dict[str, str]:
     return {"kind": kind, "data": base64.b64encode(stored.tobytes()).decode("ascii")}
 
 
-def page_text(picture: RunPicture) -> str:
+def page_html(picture: RunPicture) -> str:
     """Return the HTML page that shows a run.
 
     Its content security policy lets the browser run the one program inside and fetch nothing. Text
@@ -77,7 +77,7 @@ def page_text(picture: RunPicture) -> str:
     script, digest = page_script_and_digest(_PACKAGE, SCRIPTS)
     contents = {
         "policy": _content_security_policy(digest),
-        "title": escape(printable(picture.title)),
+        "title": escape(escape_unprintable(picture.title)),
         "style": read_page_file(_PACKAGE, "style.css"),
         "data": _json(picture.to_json_tables()),
         "script": script,
@@ -85,7 +85,7 @@ def page_text(picture: RunPicture) -> str:
     return fill_page_template(_PACKAGE, "view.html", contents)
 
 
-def page_of_several(pictures: Sequence[RunPicture]) -> str:
+def page_html_of_several(pictures: Sequence[RunPicture]) -> str:
     """Return one HTML page that shows several runs side by side on one clock.
 
     Each stands in a frame of its own, as text of this page: nothing is fetched for it either.
@@ -93,13 +93,13 @@ def page_of_several(pictures: Sequence[RunPicture]) -> str:
     script = read_page_file(_PACKAGE, "beside.js")
     _, inner = page_script_and_digest(_PACKAGE, SCRIPTS)
     frames = [
-        f'<iframe title="{escape(printable(one.title), quote=True)}" '
-        f'srcdoc="{escape(page_text(one), quote=True)}"></iframe>'
+        f'<iframe title="{escape(escape_unprintable(one.title), quote=True)}" '
+        f'srcdoc="{escape(page_html(one), quote=True)}"></iframe>'
         for one in pictures
     ]
     contents = {
         "policy": _content_security_policy(_digest(script), inner),
-        "title": escape(printable(" | ".join(one.title for one in pictures))),
+        "title": escape(escape_unprintable(" | ".join(one.title for one in pictures))),
         "frames": "\n".join(frames),
         "script": script,
     }

@@ -100,7 +100,7 @@ def _picture_of(
     tables = picture.tables
     tables["own"] = _ownship_columns(own_s, own, plane)
     if "truth" in run.tables:
-        tables["truth"] = _truth(run, plane, targets)
+        tables["truth"] = _true_target_positions(run, plane, targets)
     tables["scans"] = {
         "time_s": run.numbers("scans", "time_s"),
         "sensor": _index_of_names(run.texts("scans", "block"), sensors),
@@ -111,7 +111,7 @@ def _picture_of(
         "sensor": _index_of_names(run.texts("detections", "block"), sensors),
         "target": _index_of_names(run.texts("detections", "target"), targets),
         "scan": run.values("detections", "scan"),
-        **_lines_of_sight(run, "detections", run.stack_columns("detections", POSE), plane),
+        **_line_of_sight_columns(run, "detections", run.stack_columns("detections", POSE), plane),
     }
     for name in ("fused", "tracks"):
         if run.has_columns(name, "azimuth_rad"):
@@ -120,13 +120,13 @@ def _picture_of(
                 **base_columns(name),
                 **plain(name, "age_s"),
                 "time_s": time_s,
-                **_lines_of_sight(run, name, poses.at(name, time_s), plane),
+                **_line_of_sight_columns(run, name, poses.at(name, time_s), plane),
             }
     if "tracks" in tables:
         picture.trackers = _block_names(run, "tracks")
     if "state_tracks" in run.tables:
         picture.trackers = _block_names(run, "state_tracks")
-        tables["tracks"] = _estimates(run, picture.trackers, poses, plane)
+        tables["tracks"] = _track_estimate_columns(run, picture.trackers, poses, plane)
     if "alerts" in run.tables:
         tables["alerts"] = {
             **base_columns("alerts"), "time_s": run.numbers("alerts", "time_s"),
@@ -292,7 +292,7 @@ def _ownship_columns(
     }
 
 
-def _truth(
+def _true_target_positions(
     run: RecordedTables, plane: TangentPlane, targets: Mapping[str, int]
 ) -> dict[str, AnyArray]:
     """Return the true positions of the targets in the plane, sorted by target and then by time."""
@@ -313,7 +313,7 @@ def _truth(
     }
 
 
-def _estimates(
+def _track_estimate_columns(
     run: RecordedTables,
     trackers: list[str],
     poses: "_Poses",
@@ -364,7 +364,7 @@ def _latest_pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> F
     return np.stack([np.append(values, np.nan)[row] for values in own])
 
 
-def _lines_of_sight(
+def _line_of_sight_columns(
     run: RecordedTables, table: str, pose: FloatArray, plane: TangentPlane
 ) -> dict[str, AnyArray]:
     """Return columns with the origin, bearing from north, elevation and range of measured lines of

@@ -15,7 +15,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from components.arguments.checks import broadcast_flat, check_not_negative, positive, unflatten
+from components.arguments.checks import (
+    broadcast_flat,
+    check_not_negative,
+    check_positive,
+    unflatten,
+)
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 
 #: Per steradian and second, of pilots whom nothing has told where to look (ATC-152, 1991).
@@ -47,7 +52,7 @@ def acquisition_rate_per_s(
     """
     shape, (area, distance, beta, extinction) = broadcast_flat(
         area_m2=check_not_negative("area_m2", area_m2),
-        range_m=positive("range_m", range_m),
+        range_m=check_positive("range_m", range_m),
         beta_per_sr_s=check_not_negative("beta_per_sr_s", beta_per_sr_s),
         extinction_per_m=check_not_negative("extinction_per_m", extinction_per_m),
     )
@@ -78,7 +83,7 @@ def integrated_acquisition_rate(
     """
     from scipy.special import expn
 
-    nearest = float(positive("to_m", to_m))
+    nearest = float(check_positive("to_m", to_m))
     if not from_m >= nearest:
         raise ValueError(f"from_m is {from_m:g}: it must be at least to_m, {nearest:g}")
     extinction = float(check_not_negative("extinction_per_m", extinction_per_m))
@@ -88,22 +93,23 @@ def integrated_acquisition_rate(
 
     scale = float(check_not_negative("beta_per_sr_s", beta_per_sr_s))
     scale *= float(check_not_negative("area_m2", area_m2)) / float(
-        positive("closing_mps", closing_mps)
+        check_positive("closing_mps", closing_mps)
     )
     return scale * (illuminance_beyond(nearest) - illuminance_beyond(from_m))
 
 
-def probability_met_by_round(
+def search_round_look_probability(
     closing_mps: float, *, from_m: float, to_m: float, round_s: float, looking: float = 1.0
 ) -> float:
-    """Return the chance that a periodic search looks at a place between `from_m` and `to_m`.
+    """Return the chance that a search, once per `round_s`, looks at an aircraft from `from_m` to
+    `to_m`.
 
     The place of the aircraft is looked at once in `round_s`, at a phase that is as likely as any
     other; it shows from `from_m` on and must be seen by `to_m`. `looking` is the probability that
     somebody looks out at all.
     """
-    shows_s = max(from_m - to_m, 0.0) / float(positive("closing_mps", closing_mps))
-    return looking * min(shows_s / float(positive("round_s", round_s)), 1.0)
+    shows_s = max(from_m - to_m, 0.0) / float(check_positive("closing_mps", closing_mps))
+    return looking * min(shows_s / float(check_positive("round_s", round_s)), 1.0)
 
 
 def angular_size_rad(area_m2: FloatArray, range_m: FloatArray) -> FloatArray:
@@ -161,14 +167,14 @@ def _shown_intervals(
             continue
         left, right = ends[k][some], ends[k + 1][some]
         first, last = shows[k][some], shows[k + 1][some]
-        edge = _find_change_s(some, left, right, first, last, shown)
+        edge = _visibility_change_s(some, left, right, first, last, shown)
         cells.append(some)
         begins.append(np.where(first, left, edge))
         stops.append(np.where(last, right, edge))
     return np.concatenate(cells), np.concatenate(begins), np.concatenate(stops)
 
 
-def _find_change_s(
+def _visibility_change_s(
     cell: IntArray,
     left: FloatArray,
     right: FloatArray,
@@ -176,7 +182,9 @@ def _find_change_s(
     last: BoolArray,
     shown: AtInstants,
 ) -> FloatArray:
-    """Return when visibility changes between `left` and `right`, by halving; else `right`."""
+    """Return when (s), from `left` to `right`, visibility changes, by halving; `right` if it does
+    not.
+    """
     edge = right.copy()
     which = np.flatnonzero(first != last)
     low, high = left[which], right[which]

@@ -30,8 +30,8 @@ from components.sensor.parameters import (
     CorrelationTime,
     ErrorParameters,
     SensorParameters,
-    check_azimuths,
-    check_elevations,
+    check_field_of_view_azimuths,
+    check_field_of_view_elevations,
 )
 from components.sensor.sensor import Sensor
 from components.visual.acquisition import (
@@ -63,12 +63,16 @@ class LookoutParameters(SensorParameters):
 
     quantities: ClassVar[Mapping[str, str]] = {**ErrorParameters.quantities, "range": "m"}
 
-    azimuth_deg: Annotated[tuple[float, float], AfterValidator(check_azimuths)] = Field(
-        default=(-110.0, 90.0),
-        description="Field of view from the left seat, clockwise from the first to the second, "
-        "deg; that from the right seat is its mirror image.",
+    azimuth_deg: Annotated[tuple[float, float], AfterValidator(check_field_of_view_azimuths)] = (
+        Field(
+            default=(-110.0, 90.0),
+            description="Field of view from the left seat, clockwise from the first to the second, "
+            "deg; that from the right seat is its mirror image.",
+        )
     )
-    elevation_deg: Annotated[tuple[float, float], AfterValidator(check_elevations)] = Field(
+    elevation_deg: Annotated[
+        tuple[float, float], AfterValidator(check_field_of_view_elevations)
+    ] = Field(
         default=(-20.0, 35.0), description="Field of view in elevation, lowest and highest, deg."
     )
     left_looking: float = Field(
@@ -189,7 +193,7 @@ class _SeenBefore:
     """What is seen of chosen cells at other instants than their scans, readable like `Cells`."""
 
     def __init__(self, cells: Cells, which: IntArray, ahead_s: FloatArray) -> None:
-        self.seen: Mapping[str, AnyArray] = cells.seen_at(which, ahead_s)
+        self.seen: Mapping[str, AnyArray] = cells.relative_target_fields_ahead(which, ahead_s)
         self.state_ns = cells.state_ns[which] + np.rint(ahead_s * NANOSECONDS).astype(np.int64)
         self.roster, self.craft = cells.roster, cells.craft[which]
 
@@ -199,11 +203,11 @@ class _SeenBefore:
     def __getattr__(self, name: str) -> AnyArray:
         return self.seen[name]
 
-    def of_target(self, column: FloatArray) -> AnyArray:
+    def column_at_targets(self, column: FloatArray) -> AnyArray:
         """Return, for each chosen cell, the value of a roster column for its target."""
         return column[self.craft]
 
-    def of_row(self, name: str) -> AnyArray:
+    def field_at_rows(self, name: str) -> AnyArray:
         """Return each cell's field (such as own altitude) at the cell's instant."""
         return self.seen[name]
 
@@ -318,7 +322,7 @@ class Lookout(Sensor):
             return np.asarray(drawn < -np.expm1(-expected))
         result = np.zeros(len(which), dtype=bool)
         for seat in self._seats:
-            result |= self._is_met_by_search(seat, cells, which)
+            result |= self._is_looked_at_by_search(seat, cells, which)
         return result
 
     def _integrated_search_rate(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
@@ -344,7 +348,7 @@ class Lookout(Sensor):
 
         return integrate_rate_while_shown(before_s, shown, rate)
 
-    def _is_met_by_search(self, seat: _Seat, cells: Cells, which: IntArray) -> BoolArray:
+    def _is_looked_at_by_search(self, seat: _Seat, cells: Cells, which: IntArray) -> BoolArray:
         """Return which cells' visible aircraft a search looked at since the last scan (mask)."""
         share = self._looking_share(seat, cells, which)
         looks = np.flatnonzero(share > 0.0)

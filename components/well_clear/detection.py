@@ -12,7 +12,7 @@ from components.well_clear.relative_motion import (
     meets_within_time,
     vertical_span,
 )
-from components.well_clear.tcas import TcasAdvisory, tcas_span
+from components.well_clear.tcas import TcasAdvisory, tcas_advisory_span
 from components.well_clear.volume import Relative, Volume, horizontal_span, violation_span
 from dsa_des.arrays.types import BoolArray, FloatArray
 
@@ -162,7 +162,7 @@ def _common_hull(one: Span, other: Span) -> Span:
     return Span(np.minimum(one.begin_s, other.begin_s), np.maximum(one.end_s, other.end_s))
 
 
-def detection_span(
+def violation_or_advisory_span(
     volume: Volume | TcasAdvisory,
     relative: Relative,
     own_up_mps: tuple[Any, Any] | None,
@@ -179,7 +179,7 @@ def detection_span(
     if isinstance(volume, TcasAdvisory):
         if own_up_mps is None:
             raise ValueError("advisories of TCAS II need the ownship's altitude and climb")
-        return tcas_span(
+        return tcas_advisory_span(
             relative, *own_up_mps, resolution=volume.resolution, begin_s=begin_s, end_s=end_s
         )
     if bounds is not None:

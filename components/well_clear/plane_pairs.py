@@ -82,7 +82,8 @@ def closest_meetings(
     sizes_m: Sequence[tuple[float, float]],
     missed_m: Sequence[tuple[float, float]],
 ) -> Meetings:
-    """Return each run's passing of the nearest intruder, in blocks of pairs with run numbers.
+    """Return each run's closest passing of an intruder; `paths` gives run numbers and paths of
+    pairs.
 
     They are looked at from time 0 to `end_s`; cylinders are (radius, half height), m: as many that
     somebody comes inside of, or that are missed.
@@ -97,7 +98,7 @@ def closest_meetings(
     for number, of in paths:
         pairs = PairsInPlane(of.cut_at(end_s))
         for k, limits in enumerate(sizes_m):
-            surely, maybe = pairs.masks_surely_and_unsurely_inside(*limits)
+            surely, maybe = pairs.masks_sure_and_uncertain_entry(*limits)
             inside[k, number[surely]] = True
             unsure[k, number[maybe]] = True
         for k, limits in enumerate(missed_m):
@@ -106,7 +107,7 @@ def closest_meetings(
             ):
                 np.minimum.at(found[k], number, miss_m)
         closest, *angles = pairs.closest_approaches()
-        foreseen_s = pairs.conflict_foreseen_s(*sizes_m[0], closest[0])
+        foreseen_s = pairs.foreseen_conflict_duration_s(*sizes_m[0], closest[0])
         parts.append((number, np.insert(closest, 4, foreseen_s, axis=0), *angles))
     unsure &= ~inside
     if not parts:
@@ -161,7 +162,7 @@ class PairsInPlane:
             good &= np.abs(path[2]).max(axis=0, initial=0.0) <= _HIGHEST_M
             self.beyond |= ~(good & (step_m <= _LONGEST_M))
 
-    def masks_surely_and_unsurely_inside(
+    def masks_sure_and_uncertain_entry(
         self, horizontal_m: float, vertical_m: float
     ) -> tuple[BoolArray, BoolArray]:
         """Return which pairs enter the cylinder surely, and for which it is uncertain (masks)."""
@@ -249,7 +250,7 @@ class PairsInPlane:
         vague[pair[np.any(slow, axis=0)]] = True
         return closest, between, vague
 
-    def conflict_foreseen_s(
+    def foreseen_conflict_duration_s(
         self, horizontal_m: float, vertical_m: float, until_s: FloatArray
     ) -> FloatArray:
         """Return for how many seconds before `until_s` each pair, extrapolated straight on, would
@@ -336,7 +337,9 @@ def _fractions_within_radius(
 def _fractions_within_height(
     up: FloatArray, climbed: FloatArray, vertical_m: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return begin and end, as fractions of movements, of being vertically within `vertical_m`."""
+    """Return begin and end, as fractions of movements, of being vertically within `vertical_m`, not
+    clipped to 0 to 1; of level movements -inf and inf if within, else inf and -inf.
+    """
     climbs = climbed != 0.0
     rate = np.where(climbs, climbed, 1.0)
     edges = (-vertical_m - up) / rate, (vertical_m - up) / rate

@@ -33,7 +33,7 @@ class PairSeparation(NamedTuple):
     modified_tau_s: FloatArray
 
 
-def separation(
+def present_and_projected_separation(
     relative: Relative, lookahead_s: float, tau_distance_m: FloatArray
 ) -> PairSeparation:
     """Return distances, relative speeds, and closest distances projected within `lookahead_s`.
@@ -83,7 +83,7 @@ _FIRST_PIECES = 64
 _PAIRS_AT_ONCE = 128
 
 
-def first_inside_cylinder(
+def first_time_inside_cylinder_s(
     apart: Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]],
     between_s: tuple[FloatArray, FloatArray],
     closing_mps: FloatArray,
@@ -103,7 +103,7 @@ def first_inside_cylinder(
     begin_s, end_s = between_s
     starts = range(0, len(closing_mps), _PAIRS_AT_ONCE)
     firsts = [
-        _first_inside_of_some(
+        _first_inside_from_pair_on(
             apart, some.start, begin_s[some], end_s[some], closing_mps[some],
             horizontal_m, vertical_m,
         )
@@ -112,7 +112,7 @@ def first_inside_cylinder(
     return np.concatenate(firsts) if firsts else np.empty(0)
 
 
-def _first_inside_of_some(
+def _first_inside_from_pair_on(
     apart: Callable[[IntArray, FloatArray], tuple[FloatArray, FloatArray]],
     first: int,
     begin_s: FloatArray,
@@ -121,7 +121,7 @@ def _first_inside_of_some(
     horizontal_m: float,
     vertical_m: float,
 ) -> FloatArray:
-    """Return `first_inside_cylinder` of the pairs from the number `first` on."""
+    """Return `first_time_inside_cylinder_s` of the pairs from the number `first` on."""
     earliest = np.full(len(begin_s), np.inf)
     length = (end_s - begin_s) / _FIRST_PIECES
     looked_at = np.flatnonzero(end_s >= begin_s)

@@ -10,7 +10,7 @@ from components.well_clear.volume import Relative
 from dsa_des.arrays.types import FloatArray
 
 
-def miss_distance_m(relative: Relative) -> FloatArray:
+def horizontal_miss_distance_m(relative: Relative) -> FloatArray:
     """Return horizontal distance, m, at closest approach in straight flight, or now if past."""
     east, north, _, v_east, v_north, _ = relative
     motion = horizontal_products(east, north, v_east, v_north)
@@ -18,7 +18,7 @@ def miss_distance_m(relative: Relative) -> FloatArray:
     return np.hypot(east + ahead_s * v_east, north + ahead_s * v_north)
 
 
-def loss_severity(
+def loss_severity_percent(
     relative: Relative,
     horizontal_m: float = 4000 * FOOT_M,
     vertical_m: float = 450 * FOOT_M,
@@ -53,7 +53,7 @@ def loss_severity(
     scale = np.maximum(horizontal_m, 0.5 * (np.sqrt(reach * reach + 4.0 * horizontal_m**2) - reach))
     clear = [
         np.minimum(range_m / scale, 1.0),
-        np.minimum(miss_distance_m(relative) / horizontal_m, 1.0),
+        np.minimum(horizontal_miss_distance_m(relative) / horizontal_m, 1.0),
         np.minimum(np.abs(up) / vertical_m, 1.0),
     ]
     depth = (1.0 - clear[0] ** 2) * (1.0 - clear[1] ** 2) * (1.0 - clear[2] ** 2)
@@ -111,7 +111,8 @@ def collision_probability(
     horizontal_m: float = 500 * FOOT_M,
     vertical_m: float = 100 * FOOT_M,
 ) -> FloatArray:
-    """Return the NMAC probability at closest approach, given both aircraft's altimeter errors.
+    """Return the probability of a near mid-air collision at closest approach, given altimeter
+    errors.
 
     Parameters
     ----------

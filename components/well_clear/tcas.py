@@ -80,7 +80,7 @@ def sensitivity_level(altitude_m: FloatArray) -> IntArray:
     return FIRST_LEVEL + np.searchsorted(LEVEL_TOPS_M, np.asarray(altitude_m), side="left")
 
 
-def recovery_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+def recovery_cylinder_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return radius and half height (m) of the cylinder to keep clear in recovery, from the TCAS
     sensitivity level at the ownship's altitude.
 
@@ -95,7 +95,7 @@ def recovery_sizes_m(altitude_m: FloatArray) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def tcas_span(
+def tcas_advisory_span(
     relative: Relative,
     altitude_m: Any,
     climb_mps: Any,

@@ -90,13 +90,13 @@ def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | Floa
     inside = motion.range_sq_m2 <= radius_m * radius_m
     leave = exit_of_circle_s(motion, radius_m, root)
     leave = np.where(inside & still, duration_s, np.minimum(leave, duration_s))
-    entry, ahead = _entry_time_from_outside(motion, volume, delta, root, still)
+    entry, ahead = _entry_time_and_possible_mask(motion, volume, delta, root, still)
     entry = np.where(inside, 0.0, np.maximum(entry, 0.0))
     met = inside | (ahead & (delta >= 0.0) & (p <= 0.0) & (entry <= duration_s))
     return Span(np.where(met, entry, np.inf), np.where(met, leave, -np.inf))
 
 
-def _entry_time_from_outside(
+def _entry_time_and_possible_mask(
     motion: Horizontal, volume: Volume, delta: FloatArray, root: FloatArray, still: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
     """Return the time at which pairs outside the radius meet the horizontal condition, and a mask
@@ -114,7 +114,8 @@ def _entry_time_from_outside(
 
 
 def _modified_tau_entry(motion: Horizontal, volume: Volume, delta: FloatArray) -> FloatArray:
-    """Return the smaller root of r²(t) + τ s·v(t) = D², 0 where it has passed.
+    """Return when, s, modified tau meets its threshold: r²(t) + τ s·v(t) = D²; 0 where that has
+    passed.
 
     Its discriminant is 4Δ(D) + (τ v²)², a sum without cancellation where the flight meets the
     circle. Where the constant term is not positive, the condition holds now.

@@ -13,7 +13,7 @@ from components.arguments.units import SPEED_OF_LIGHT_M_S
 from components.atmosphere.rain_echo import rain_reflectivity_per_m, rain_volume_m3
 from components.radar.detection.cfar import cfar_loss_db
 from components.radar.doppler import MovingTargetFilter
-from components.thesis.drawing import GREY, legend_below, panels
+from components.thesis.drawing import GREY, draw_legend_below, panels_written_as_png
 from components.thesis.drawing import RADAR as RADAR_COLOUR
 from docs.make.stamp import stamped
 from dsa_des.block.mark import BLUE, PINK
@@ -270,7 +270,7 @@ def table(seeds: int) -> list[str]:
 
 def draw(path: Path) -> None:
     """Draw the range of Pd 0.5 over the ground's reflectivity, and over the intruder's speed."""
-    with panels(path, 1, 2) as (left, right):
+    with panels_written_as_png(path, 1, 2) as (left, right):
         for name, keys, colour, style in _WAYS:
             ranges = [half_range_m(keys, gamma_db) / 1000 for gamma_db in _GAMMAS_DB]
             left.plot(_GAMMAS_DB, ranges, style, color=colour, linewidth=1.3, label=name)
@@ -282,7 +282,7 @@ def draw(path: Path) -> None:
         right.set_xlabel("speed of the intruder, m/s")
         for axes in (left, right):
             axes.set_ylim(0, 10)
-        legend_below(left, 2)
+        draw_legend_below(left, 2)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -11,7 +11,7 @@ import numpy as np
 
 from components.arguments.checks import FloatArray
 from components.radar.detection import detection_probability, first_declaration_probability
-from components.thesis.drawing import GREY, legend_below, panels
+from components.thesis.drawing import GREY, draw_legend_below, panels_written_as_png
 from dsa_des.block.mark import BLUE, GREEN
 from dsa_des.library.study import study
 
@@ -216,7 +216,7 @@ def _draw(
     path: Path, cells: Any, rates: list[float], lasts: list[float], reached: Any, certain: float
 ) -> None:
     titles = {"free": "free scan (thesis)", "dwell": "budget of time"}
-    with panels(path, 1, 2, sharex=True, sharey=True) as both:
+    with panels_written_as_png(path, 1, 2, sharex=True, sharey=True) as both:
         for axes, (budget, title) in zip(both, titles.items(), strict=True):
             for tau, colour in zip(lasts, (GREY, BLUE, GREEN), strict=True):
                 drawn = [cells[budget, rate, tau][1] for rate in rates]
@@ -235,4 +235,4 @@ def _draw(
             axes.set_xticks([], minor=True)
             axes.set_ylim(0, None)
         both[0].set_ylabel("range of declaration, km")
-        legend_below(both[0], 3)
+        draw_legend_below(both[0], 3)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import dsa_des
-from components.thesis.drawing import EO, RADAR, panels
+from components.thesis.drawing import EO, RADAR, panels_written_as_png
 from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 FIGURE = "measurement_errors.png"
@@ -39,7 +39,7 @@ def draw(path: Path) -> None:
         ("radar", RADAR, "range_m", "range_variance_m2", 1.0, "range, m"),
         ("eo", EO, "azimuth_rad", "azimuth_variance_rad2", np.degrees(1.0), "azimuth, deg"),
     )
-    with panels(path, 1, 3, height_in=2.6) as axes:
+    with panels_written_as_png(path, 1, 3, height_in=2.6) as axes:
         for one, (block, colour, name, variance, unit, text) in zip(axes, shown, strict=True):
             found, grid = looks(block, *BY_SIGNAL), looks(block)
             range_km = found["true_range_m"] / 1000.0

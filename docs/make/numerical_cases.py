@@ -9,12 +9,12 @@ import numpy as np
 
 from components.geometry import (
     body_angles,
+    body_angles_of_sight_line,
     geodesic_line_of_sight,
     line_of_sight,
     longitude_difference_deg,
-    sensor_angles,
 )
-from components.high_precision.multiprecision import multiprecision
+from components.high_precision.multiprecision import mpmath_library
 from components.sensor.grid import Grid
 from dsa_des.time.clock import ClockSpec, ScanClock, common_ticks_per_second, parse_rational
 
@@ -93,7 +93,7 @@ def _distance(lib: Any, own: Position, target: Position) -> float:
 
 
 def _slant_range(what: str, own: Position, target: Position) -> NumericalCase:
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     with mpmath.workdps(40):
         truth = _distance(mpmath, own, target)
     ours = float(line_of_sight(*own, *target)[2])
@@ -104,7 +104,7 @@ def _slant_range(what: str, own: Position, target: Position) -> NumericalCase:
 
 
 def _antimeridian() -> NumericalCase:
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     own, target = (10.0, 179.9999, 500.0), (10.0, -179.9999, 500.0)
     east = (target[1] - own[1]) * 111_195.0 * math.cos(own[0] * DEG)
     with mpmath.workdps(40):
@@ -136,7 +136,7 @@ def _longitudes() -> NumericalCase:
 
 
 def _quarter_meridian() -> NumericalCase:
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     naive = 90.0 * 111_195.0
     ours = float(geodesic_line_of_sight(0.0, 0.0, 0.0, 90.0, 0.0, 0.0)[2])
     with mpmath.workdps(40):
@@ -168,7 +168,7 @@ def _zenith() -> NumericalCase:
 
 
 def _pitch_astern() -> NumericalCase:
-    _, q = sensor_angles(math.pi, 0.0, 0.0, 5.0 * DEG, 0.0)
+    _, q = body_angles_of_sight_line(math.pi, 0.0, 0.0, 5.0 * DEG, 0.0)
     return NumericalCase(
         "target astern, ownship pitched up 5°: elevation q, deg",
         "thesis eq. 5",
@@ -218,8 +218,12 @@ def _meetings(
     what: str, formula: str, naive: int, rates: tuple[object, object], truth: int
 ) -> NumericalCase:
     specs = [ClockSpec(parse_rational(rate)) for rate in rates]
-    ticks_per_s = common_ticks_per_second([time for spec in specs for time in spec.exact_times()])
-    scans = [ScanClock(spec, ticks_per_s).between(0, _HOUR_S * ticks_per_s)[1] for spec in specs]
+    ticks_per_s = common_ticks_per_second(
+        [time for spec in specs for time in spec.times_needing_whole_ticks()]
+    )
+    scans = [
+        ScanClock(spec, ticks_per_s).scans_between(0, _HOUR_S * ticks_per_s)[1] for spec in specs
+    ]
     ours = np.intersect1d(scans[0], scans[1]).size
     return NumericalCase(what, formula, naive, ours, truth, "rational numbers")
 
@@ -251,8 +255,8 @@ def _firings() -> NumericalCase:
         if time_s - last >= 1.0 / 5.0:
             fired, last = fired + 1, time_s
     spec = ClockSpec(Fraction(5))
-    ticks_per_s = common_ticks_per_second(spec.exact_times())
-    ours = ScanClock(spec, ticks_per_s).between(0, 1000 * ticks_per_s)[0].size
+    ticks_per_s = common_ticks_per_second(spec.times_needing_whole_ticks())
+    ours = ScanClock(spec, ticks_per_s).scans_between(0, 1000 * ticks_per_s)[0].size
     return NumericalCase(
         "5 Hz for 1000 s: scans",
         "if t - last >= 1/f, t = k·0.1 s",

@@ -18,7 +18,7 @@ from components.benchmark.scenes import (
     load_case_scene,
     peak_memory_mb,
     random_phase_replicas,
-    time_engine_run,
+    time_build_and_run,
 )
 from dsa_des.record.sinks import MemorySink
 from dsa_des.scene.scene import Scene
@@ -65,7 +65,8 @@ def point(axis: str, value: float) -> dict[str, Any]:
     scene, scenes = _scenes(axis, value)
     to_disk = axis in ("simulated time, s", "replicas")
     runs = [
-        time_engine_run(scene, scenes, None if to_disk else MemorySink()) for _ in range(_REPEATS)
+        time_build_and_run(scene, scenes, None if to_disk else MemorySink())
+        for _ in range(_REPEATS)
     ]
     cpu_s, units = min((run_s, units) for _, run_s, units in runs)
     return {

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from components.thesis.drawing import GREY, RADAR, legend_below, panels
+from components.thesis.drawing import GREY, RADAR, draw_legend_below, panels_written_as_png
 from docs.make.declaration_ranges import (
     HeadOn,
     certain_range_m,
@@ -207,7 +207,7 @@ def draw(
 ) -> None:
     """Draw ranges over scan rate: on average, and declared by 95 %."""
     fine = [approach.pulses / pulses for pulses in range(1, 51)]
-    with panels(path, 1, 2, sharex=True) as (left, right):
+    with panels_written_as_png(path, 1, 2, sharex=True) as (left, right):
         for axes, value, title in (
             (left, mean_range_m, "mean"),
             (right, _certain, f"declared by {CERTAIN:.0%}"),
@@ -241,7 +241,7 @@ def draw(
                     )  # fmt: skip
         for axes in (left, right):
             axes.set_ylim(0, None)
-        legend_below(left, 2)
+        draw_legend_below(left, 2)
 
 
 def _quantile_interval(ranges: Any) -> tuple[float, float, float]:

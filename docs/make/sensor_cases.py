@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from components.high_precision.multiprecision import multiprecision
+from components.high_precision.multiprecision import mpmath_library
 from components.optical.signature import line_of_sight_rate, pixels_covered
 from components.optical.silhouette import visible_area
 from components.radar.detection import (
@@ -89,7 +89,7 @@ def _upper(mpmath: Any, pulses: int, v: Any) -> Any:
 
 def _swerling_1_truth(pulses: int, pfa: float, snr: float) -> float:
     """Give thesis eq. 32 with digits enough for its cancellation; 2 pulses or more."""
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     # (1 + 1/(n SNR))^(n - 1) and the incomplete gamma function cancel this many digits.
     lost = int(pulses * math.log10(1.0 + 1.0 / (pulses * snr)))
     with mpmath.workdps(60 + lost):
@@ -106,7 +106,7 @@ def _swerling_1_truth(pulses: int, pfa: float, snr: float) -> float:
 def _miss() -> NumericalCase:
     snr = 1e12
     radar: dict[str, Any] = {"pulses": 2, "false_alarm_probability": 1e-6, "model": "swerling2"}
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     with mpmath.workdps(60):
         x = _threshold_truth(mpmath, 2, 1e-6) / (1 + mpmath.mpf(snr))
         truth = float(1 - _upper(mpmath, 2, x))
@@ -134,7 +134,7 @@ def _gram_charlier() -> NumericalCase:
         - 0.5 * c3 * c3 * z * (z**4 - 10.0 * z * z + 15.0)
     )
     printed = 0.5 * math.erfc(z / math.sqrt(2.0)) - math.exp(-0.5 * z * z) * series
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     with mpmath.workdps(50):
         v_exact, echo = _threshold_truth(mpmath, pulses, pfa), pulses * mpmath.mpf(snr)
         weight, truth = mpmath.exp(-echo), mpmath.mpf(0)
@@ -203,7 +203,7 @@ def _rate(
         formula, turned = "acos(a·b)", math.acos(math.cos(now[0] - before[0]))
     else:
         formula, turned = "thesis eq. 16-17", math.hypot(now[0] - before[0], now[1] - before[1])
-    mpmath = multiprecision()
+    mpmath = mpmath_library()
     with mpmath.workdps(40):
         (p1, q1), (p2, q2) = (tuple(mpmath.mpf(x) for x in pair) for pair in (before, now))
         # Haversine: sums of squares only.

@@ -16,10 +16,10 @@ from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.results.labels import short_text
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, parse_key_path
-from dsa_des.scene.overrides import SWAP, parse_assignment, parse_value
+from dsa_des.scene.overrides import SWAP, parse_assignment, parse_toml_or_text
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.axes import Axis, parse_axis
-from dsa_des.studies.metric import check_recorded
+from dsa_des.studies.metric import check_tables_recorded
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_checks import cells_covering_values
 
@@ -56,7 +56,7 @@ class Alternatives:
     scenes: dict[str, list[dict[str, Any]]] = field(default_factory=dict)
 
 
-def make_comparable_study(study: Study) -> tuple[Study, list[str]]:
+def same_replicas_study_and_notes(study: Study) -> tuple[Study, list[str]]:
     """Return a copy of the study that runs the same replicas with every model (without
     ``[accuracy]``, allocate and stop_when), and a note on each setting left out.
     """
@@ -90,10 +90,11 @@ def add_model_axis(study: Study, alternatives: Sequence[Alternative]) -> Study:
     return replace(study, axes=(*study.axes, axis), baseline=(COLUMN, AS_IT_IS))
 
 
-def find_alternatives(
+def find_models_to_compare(
     study: Study, block: str | None, listed: Sequence[str], answers: Sequence[str]
 ) -> Alternatives:
-    """Return the models to compare: rungs of all ladders, or of one block's, and those listed.
+    """Return the models to compare: each rung of all blocks' accuracy ladders, or of `block`'s
+    only, and those of the ``--vary`` texts `listed`.
 
     `listed` are texts ``KEY=VALUE`` or ``KEY=[VALUE, ...]``, as ``--set`` and axes have them.
     """
@@ -106,7 +107,7 @@ def find_alternatives(
             f"--block {block}: the scene has no such block{did_you_mean(block, sorted(known))}"
         )
     fixed = _keys_varied_by_study(study)
-    for name, ladder, at in _effective_ladders(study, scenes, block, found):
+    for name, ladder, at in _ladders_and_tables_with_effect(study, scenes, block, found):
         for rung in ladder.rungs:
             label = f"{name} {ladder.name}: {rung.name}"
             try:
@@ -115,12 +116,12 @@ def find_alternatives(
             except Unavailable as error:
                 found.unavailable.append((label, str(error)))
                 continue
-            _classify_alternative(study, alternative, cells, answers, found)
+            _classify_and_add_alternative(study, alternative, cells, answers, found)
     for text in listed:
         before = len(found.unavailable)
         some = _parse_vary_option(study, text, scenes[cells[0]], fixed)
         for alternative in some:
-            _classify_alternative(study, alternative, cells, answers, found)
+            _classify_and_add_alternative(study, alternative, cells, answers, found)
         wrong = found.unavailable[before:]
         if len(wrong) == len(some):
             raise UsageError(f"--vary {text}: {wrong[0][1]}")
@@ -133,11 +134,11 @@ def _cells_covering_axis_values(study: Study) -> list[int]:
     return [
         cell
         for cell in cells_covering_values(study)
-        if not any(study.indices(cell)[position] for position in sampled)
+        if not any(study.axis_value_indices(cell)[position] for position in sampled)
     ]
 
 
-def _effective_ladders(
+def _ladders_and_tables_with_effect(
     study: Study, scenes: Mapping[int, Scene], block: str | None, found: Alternatives
 ) -> list[tuple[str, Ladder, list[dict[str, Any]]]]:
     """Return (block name, ladder, the block's parameter table in each scene) for every ladder that
@@ -203,7 +204,7 @@ def _parse_vary_option(
     parsed = parse_assignment(text, "--vary")
     if isinstance(parsed, Problem):
         raise SceneError([parsed])
-    key, value = parsed[0], parse_value(parsed[1])
+    key, value = parsed[0], parse_toml_or_text(parsed[1])
     try:
         axis = parse_axis(key, value if isinstance(value, list | dict) else [value], scene)
     except ValueError as error:
@@ -240,7 +241,7 @@ def _keys_varied_by_study(study: Study) -> dict[Key, str]:
 
 
 def _refuse_varied_keys(study: Study, alternative: Alternative, fixed: Mapping[Key, str]) -> None:
-    """Raise Unavailable for a model that sets what the study varies: all else must stay."""
+    """Raise Unavailable if a model would change a scene key that the study itself varies."""
     keys: list[Key] = [parse_key_path(study.base.data, key) for key, _ in alternative.sets]
     keys += [("blocks", block, "type") for block, _ in alternative.swaps]
     for key in keys:
@@ -248,7 +249,7 @@ def _refuse_varied_keys(study: Study, alternative: Alternative, fixed: Mapping[K
             raise Unavailable(f"{fixed[key]} sets it")
 
 
-def _classify_alternative(
+def _classify_and_add_alternative(
     study: Study, alternative: Alternative, cells: Sequence[int], answers: Sequence[str],
     found: Alternatives,
 ) -> None:  # fmt: skip
@@ -293,7 +294,7 @@ def _check_runnable(study: Study, scene: Scene, cell: int, answers: Sequence[str
     recorder = Recorder([], wanted=dict.fromkeys(wanted, ()))
     blocks = Simulation(replica_scene(scene, study.replica(0, cell)), recorder=recorder).components
     for metric in metrics:
-        check_recorded(metric, blocks)
+        check_tables_recorded(metric, blocks)
         metric.check(blocks)
     given = {result.name for metric in metrics for result in metric.results()}
     for name in answers:

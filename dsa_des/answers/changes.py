@@ -52,7 +52,7 @@ class PairedChange:
     reason: str = ""
 
     @property
-    def identical(self) -> bool:
+    def has_only_identical_runs(self) -> bool:
         """Whether every run gave the same to the last bit."""
         return self.runs > 0 and self.differing == 0
 
@@ -64,7 +64,7 @@ class PairedChange:
 
     @property
     def largest_possible_change(self) -> float:
-        """The largest change that the interval leaves possible; NaN where nothing is sure."""
+        """Largest absolute change in the interval; NaN if runs lack or cut values, or are few."""
         if self.reason or self.lost or self.gained or self.cut_off or self.difference.few:
             return math.nan
         return max(abs(self.difference.low), abs(self.difference.high))
@@ -78,7 +78,9 @@ def confidence_per_interval(confidence: float, comparisons: int) -> float:
 def changes_by_model(
     rows: Rows, results: Sequence[Result], confidence: float, method: str, comparisons: int
 ) -> list[PairedChange]:
-    """Return the change of every result by every model at every place, where both have runs."""
+    """Return every result's paired change by every model, at each combination of the study's own
+    axis values where both have runs.
+    """
     each = confidence_per_interval(confidence, comparisons)
     owns: dict[tuple[str, tuple[Any, ...]], Estimate] = {}
     changes = []
@@ -101,15 +103,17 @@ def _estimate_change(
     runs = len(pair[0])
     differing = np.zeros(runs, dtype=bool)
     for one, other in _paired_columns(rows, result, pair):
-        differing |= ~((one == other) | (_is_missing(one) & _is_missing(other)))
+        differing |= ~(
+            (one == other) | (_mask_of_missing_values(one) & _mask_of_missing_values(other))
+        )
     cut_off, neither = np.zeros(runs, dtype=bool), 0
     if result.kind != RATIO:
-        missing = [_is_missing(rows.column(result.name)[side]) for side in pair]
+        missing = [_mask_of_missing_values(rows.column(result.name)[side]) for side in pair]
         neither = int((missing[0] & missing[1]).sum())
         if result.cut_off is not None:  # of what never comes nothing was cut off: it is lost
             for side, without in zip(pair, missing, strict=True):
-                cut_off |= ~_is_missing(rows.column(result.cut_off)[side]) & ~without
-    found, reason, events = _paired_difference(rows, result, pair, confidence)
+                cut_off |= ~_mask_of_missing_values(rows.column(result.cut_off)[side]) & ~without
+    found, reason, events = _difference_and_ratio_problems(rows, result, pair, confidence)
     if not reason and math.isnan(found.paired.value):
         reason = "no run has a value with both"
     elif not reason and found.paired.count < 2:
@@ -118,7 +122,7 @@ def _estimate_change(
         reason = f"{found.paired.count} runs are too few for an interval"
     presence = None
     if result.kind != RATIO and (found.only_first or found.only_second):
-        _, first, second = rows.paired_values(result.name, *pair)
+        _, first, second = rows.paired_means_by_unit(result.name, *pair)
         has = [(~np.isnan(values)).astype(float) for values in (first, second)]
         presence = estimate_difference(has[0], has[1], confidence, kind=EVENT).paired
     return PairedChange(
@@ -128,7 +132,7 @@ def _estimate_change(
     )  # fmt: skip
 
 
-def _paired_difference(
+def _difference_and_ratio_problems(
     rows: Rows, result: Result, pair: tuple[IntArray, IntArray], confidence: float
 ) -> tuple[EstimatedDifference, str, float]:
     """Return the paired difference, the reason why a risk ratio cannot be computed (else empty),
@@ -159,7 +163,7 @@ def _paired_columns(
         yield values[pair[0]], values[pair[1]]
 
 
-def _is_missing(values: AnyArray) -> AnyArray:
+def _mask_of_missing_values(values: AnyArray) -> AnyArray:
     """Return whether each is a missing number or a missing text."""
     if values.dtype == object:
         return np.array([value is None for value in values.tolist()], dtype=bool)

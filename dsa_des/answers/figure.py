@@ -8,7 +8,7 @@ from dsa_des.answers.alternatives import AS_IT_IS
 from dsa_des.answers.report import AnswerReport
 from dsa_des.answers.verdicts import ModelVerdict
 from dsa_des.block.mark import RED
-from dsa_des.costs.cost_report import Label, put_labels
+from dsa_des.costs.cost_report import Label, place_labels_without_overlap
 from dsa_des.record.drawing import draw_to_png, figure_text, fit_axes_to_texts, set_plain_log_ticks
 from dsa_des.results.labels import unit_of
 
@@ -18,7 +18,7 @@ _FAR = 2.0
 _WIDE_IN, _HIGH_IN, _COLUMNS = 5.2, 3.9, 2
 
 
-def draw_answers(path: Path, report: AnswerReport) -> None:
+def draw_changes_against_cpu(path: Path, report: AnswerReport) -> None:
     """Draw the change of each result with its interval against CPU: a panel for each result.
 
     The limit is a band, the front is red. Models are named that are on the front, whose intervals
@@ -31,13 +31,13 @@ def draw_answers(path: Path, report: AnswerReport) -> None:
         drawn = []
         for number, result in enumerate(report.results, start=1):
             axes = figure.add_subplot(rows, columns, number)
-            drawn.append((axes, _draw_panel(axes, report, result.name)))
+            drawn.append((axes, _draw_result_and_list_labels(axes, report, result.name)))
         fit_axes_to_texts(figure)
         for axes, labels in drawn:  # where points are is known only now
-            put_labels(axes, labels)
+            place_labels_without_overlap(axes, labels)
 
 
-def _draw_panel(axes: Any, report: AnswerReport, name: str) -> list[Label]:
+def _draw_result_and_list_labels(axes: Any, report: AnswerReport, name: str) -> list[Label]:
     """Draw the models of one result, and return their labels."""
     shown = [v for v in report.verdicts[name] if _can_be_drawn(report, v)]
     limits = {verdict.limit for verdict in shown}

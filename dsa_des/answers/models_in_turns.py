@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.costs.replay import median_and_spread
+from dsa_des.costs.replay import median_and_half_iqr
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.results.folder import StudyFolder
@@ -71,8 +71,8 @@ class TurnTimes:
         taken = [[*key, self.cpu_s[key], self.runs[key]] for key in sorted(self.runs)]
         write_file(path, json.dumps({"turns": turns, "taken": taken}).encode())
 
-    def read_earlier(self, path: Path) -> tuple[int, int] | None:
-        """Return an earlier attempt's (finished, planned) turns and read its times; else None."""
+    def read_and_count_earlier_turns(self, path: Path) -> tuple[int, int] | None:
+        """Read an earlier attempt's times; return (finished, planned) turns; None without file."""
         try:
             content = json.loads(path.read_bytes())
             turns = int(content["turns"])
@@ -86,13 +86,13 @@ class TurnTimes:
             raise UsageError(f"{path}: {said}") from error
         return 1 + max(self.runs)[0], turns
 
-    def cpu_ms_per_run(self, model: int) -> tuple[float, float]:
+    def run_cpu_ms_and_spread(self, model: int) -> tuple[float, float]:
         """Return a model's CPU time per run, ms: median and half interquartile range of turns."""
         each = [1e3 * self.cpu_s[key] / self.runs[key] for key in sorted(self.cpu_s)
                 if key[1] == model]  # fmt: skip
-        return median_and_spread(each)
+        return median_and_half_iqr(each)
 
-    def cpu_ratio_to_own(self, model: int) -> tuple[float, float]:
+    def relative_cpu_and_spread(self, model: int) -> tuple[float, float]:
         """Return a model's CPU time per run divided by that of the scene as it is: the median over
         the turns that have both, and half the interquartile range.
         """
@@ -102,10 +102,10 @@ class TurnTimes:
             / (self.cpu_s[turn, 0] / self.runs[turn, 0])
             for turn in turns
         ]
-        return median_and_spread(each)
+        return median_and_half_iqr(each)
 
 
-def run_in_turns(
+def run_all_models_in_turns(
     study: Study,
     folder: StudyFolder,
     executor: Executor,
@@ -116,8 +116,8 @@ def run_in_turns(
     after: Callable[[int], Sequence[int]],
     done: int = 0,
 ) -> None:
-    """Run every model of a study, one batch of runs after the other; write results into the study's
-    open folder and CPU times into `turn_times`.
+    """Run all models batch by batch (a turn each); write results to the open `folder`, times to
+    `turn_times`; ``after(turns done)`` returns the models to go on with.
 
     `begun` is told how long the scene as it is took in the first turn; `after` is told after each
     turn how many are done, and returns the models to go on with. `turn_times` is filled on the way;

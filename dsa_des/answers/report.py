@@ -16,16 +16,16 @@ from dsa_des.answers.verdicts import (
     WITHIN,
     Limit,
     ModelVerdict,
+    flag_verdicts_on_cost_front,
     format_change,
-    is_on_cost_front,
-    judge_model,
+    judge_by_worst_change,
 )
-from dsa_des.results.labels import round_to_interval, short_text, unit_of
+from dsa_des.results.labels import short_text, texts_rounded_to_interval, unit_of
 from dsa_des.results.printing import rounded_value_and_interval
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 #: Columns of the table of one result.
 HEADS = (COLUMN, "CPU", "change", "interval", "where it weighs most", "runs that differ", "verdict")
@@ -58,21 +58,22 @@ class AnswerReport:
 
     def __post_init__(self) -> None:
         self.costs = {
-            name: self.turn_times.cpu_ratio_to_own(k) for k, name in enumerate(self.models, start=1)
+            name: self.turn_times.relative_cpu_and_spread(k)
+            for k, name in enumerate(self.models, start=1)
         }
         cheap = {name: cost for name, (cost, _) in self.costs.items()}
         #: Result → the verdicts of all models, in their order.
         self.verdicts: dict[str, list[ModelVerdict]] = {}
         for result in self.results:
             some = [
-                judge_model(
+                judge_by_worst_change(
                     name, result,
                     [c for c in self.changes if c.model == name and c.result.name == result.name],
                     self.limits[result.name], self.failed.get(name, ""),
                 )
                 for name in self.models
             ]  # fmt: skip
-            front = is_on_cost_front(some, cheap)
+            front = flag_verdicts_on_cost_front(some, cheap)
             self.verdicts[result.name] = [
                 replace(one, on_front=best) for one, best in zip(some, front, strict=True)
             ]
@@ -83,7 +84,7 @@ class AnswerReport:
         """Yield the rows of one result's table as lists of texts under the headings `HEADS`: first
         the scene as it is, then each model.
         """
-        own_ms, spread_ms = self.turn_times.cpu_ms_per_run(0)
+        own_ms, spread_ms = self.turn_times.run_cpu_ms_and_spread(0)
         yield [
             AS_IT_IS,
             f"{_format_plus_minus(own_ms, spread_ms)} ms a run",
@@ -99,7 +100,7 @@ class AnswerReport:
             value, interval = rounded_value_and_interval(change.difference)
             yield [
                 verdict.model, cost, value, interval,
-                "" if change.identical else self._location_text(change),
+                "" if change.has_only_identical_runs else self._location_text(change),
                 f"{change.differing:,} of {change.runs:,}", said + _change_notes(change),
             ]  # fmt: skip
 
@@ -108,7 +109,7 @@ class AnswerReport:
             f"{n} = {short_text(v)}" for n, v in zip(self.axes, change.at, strict=True)
         )
 
-    def title_of(self, name: str) -> str:
+    def table_heading(self, name: str) -> str:
         """Return the heading of a result's table."""
         unit = unit_of(name)
         return f"{name}{f', {unit}' if unit else ''}: each model in place of the scene's own"
@@ -120,7 +121,7 @@ class AnswerReport:
         rows = []
         for change in self.changes:
             verdict, d = by[change.model, change.result.name], change.difference
-            per_run, _ = self.turn_times.cpu_ms_per_run(numbers[change.model])
+            per_run, _ = self.turn_times.run_cpu_ms_and_spread(numbers[change.model])
             cost, spread = self.costs[change.model]
             rows.append(
                 {
@@ -154,13 +155,14 @@ class AnswerReport:
 
     # -- the sentences ------------------------------------------------------------------------
 
-    def sentences(self, name: str) -> list[str]:
+    def conclusion_sentences(self, name: str) -> list[str]:
         """Return the conclusions of a result's table, the decision first."""
         some = self.verdicts[name]
         result = next(one for one in self.results if one.name == name)
         lines = [self._result_text(result)]
         taken = sorted(
-            (v for v in some if v.is_acceptable), key=lambda v: self._cost_or_infinity(v.model)
+            (v for v in some if v.is_same_or_within_limit),
+            key=lambda v: self._cost_or_infinity(v.model),
         )
         limit = self._limit_text(name)
         sure = f"{100 * self.confidence:g} %"
@@ -276,7 +278,7 @@ class AnswerReport:
             [format_change(change)] if change.difference.value == change.difference.value else []
         )
         if change.presence is not None:
-            parts.append(_count_lost_values(change))
+            parts.append(_lost_and_gained_values_text(change))
         where = self._location_text(change)
         return ", ".join(parts) + (f" where {where}" if where else "")
 
@@ -286,10 +288,10 @@ class AnswerReport:
         parts = [
             format_change(change) + (" where " + self._location_text(change) if change.at else "")
         ]
-        if change.identical:
+        if change.has_only_identical_runs:
             parts[0] = f"the same in all {change.runs:,} runs, which leaves {parts[0]}"
         if change.presence is not None:
-            parts.append(_count_lost_values(change))
+            parts.append(_lost_and_gained_values_text(change))
         if change.difference.few:
             parts.append("too few events or values to rely on")
         if change.cut_off:
@@ -327,7 +329,7 @@ class AnswerReport:
         return lines
 
 
-def _count_lost_values(change: PairedChange) -> str:
+def _lost_and_gained_values_text(change: PairedChange) -> str:
     """Return how many runs lose their value, or come to have one: they are in no difference."""
     parts = [f"{many:,} of {change.runs:,} {words}" for many, words in (
         (change.lost, "have no value with it"), (change.gained, "have a value only with it"))
@@ -336,7 +338,7 @@ def _count_lost_values(change: PairedChange) -> str:
 
 
 def _change_notes(change: PairedChange) -> str:
-    parts = [_count_lost_values(change)] if change.lost or change.gained else []
+    parts = [_lost_and_gained_values_text(change)] if change.lost or change.gained else []
     if change.neither and change.result.kind == NUMBER:
         parts.append(f"{change.neither:,} without a value with either")
     if change.cut_off:
@@ -347,7 +349,11 @@ def _change_notes(change: PairedChange) -> str:
 def _format_plus_minus(value: float, spread: float) -> str:
     if value != value:
         return ""
-    return " ± ".join(round_to_interval(spread, value, spread)) if spread > 0.0 else f"{value:.2g}"
+    return (
+        " ± ".join(texts_rounded_to_interval(spread, value, spread))
+        if spread > 0.0
+        else f"{value:.2g}"
+    )
 
 
 def _format_three_digits(value: float) -> str:
@@ -366,10 +372,12 @@ def print_report(report: AnswerReport) -> None:
         console.print()
         rows = list(report.table_rows(result.name))
         last = len(HEADS) - 1
-        print_table(console, report.title_of(result.name), HEADS, rows, below=last, right=(1, 2, 3))
+        print_table(
+            console, report.table_heading(result.name), HEADS, rows, below=last, right=(1, 2, 3)
+        )
         console.print()
-        for line in report.sentences(result.name):
-            console.print(printable(line), markup=False, highlight=False)
+        for line in report.conclusion_sentences(result.name):
+            console.print(escape_unprintable(line), markup=False, highlight=False)
     console.print()
     for line in report.notes_on_tables():
-        console.print(printable(line), markup=False, highlight=False)
+        console.print(escape_unprintable(line), markup=False, highlight=False)

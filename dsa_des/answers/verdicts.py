@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from dsa_des.answers.changes import FEW_EVENTS, PairedChange
-from dsa_des.costs.climb import is_on_front
+from dsa_des.costs.climb import flag_points_on_front
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.results.labels import format_with_interval, unit_of
 from dsa_des.results.record import FRACTION, NUMBER, Result
@@ -93,15 +93,19 @@ class ModelVerdict:
     on_front: bool = False
 
     @property
-    def is_acceptable(self) -> bool:
-        """Whether its change is surely small enough."""
+    def is_same_or_within_limit(self) -> bool:
+        """Whether its runs are all the same as the scene's own, or its change is surely within the
+        limit.
+        """
         return self.kind in (SAME, WITHIN)
 
 
-def judge_model(
+def judge_by_worst_change(
     model: str, result: Result, changes: Sequence[PairedChange], limit: Limit, failed: str
 ) -> ModelVerdict:
-    """Return the verdict on a model by the worst of `changes`; `failed` says why runs failed."""
+    """Return the verdict on a model by its worst change: beyond, unknown, open, within, same;
+    `failed` is the reason given where there are no changes.
+    """
     if not changes:
         return ModelVerdict(
             model, result, NOTHING, None, math.nan, math.nan, failed or "no run of both"
@@ -121,7 +125,7 @@ def judge_model(
         for one, amount in zip(changes, limits, strict=True)
     ]
     weight = max(weights) if all(w == w for w in weights) else math.nan
-    wanted = _units_needed(change, most) if kind == OPEN else math.nan
+    wanted = _units_needed_to_decide(change, most) if kind == OPEN else math.nan
     return ModelVerdict(model, result, kind, change, most, weight, change.reason, wanted)
 
 
@@ -132,9 +136,9 @@ def _verdict_kind(change: PairedChange, limit: float) -> str:
     if interval.few:
         return OPEN
     seen_whole = not change.cut_off  # what the run cut off may have changed by more
-    if change.identical and seen_whole and change.result.kind in (NUMBER, FRACTION):
+    if change.has_only_identical_runs and seen_whole and change.result.kind in (NUMBER, FRACTION):
         return SAME  # its interval is a point, as that of any number without a spread
-    if change.identical and seen_whole:
+    if change.has_only_identical_runs and seen_whole:
         # Of events: so many runs may still have missed the rare one.
         return SAME if -limit <= interval.low and interval.high <= limit else OPEN
     if interval.low > limit or interval.high < -limit:
@@ -158,14 +162,14 @@ def _change_relative_to_limit(change: PairedChange, limit: float) -> float:
     return size if size == size else math.inf
 
 
-def _units_needed(change: PairedChange, limit: float) -> float:
+def _units_needed_to_decide(change: PairedChange, limit: float) -> float:
     """Return how many units would decide on a limit, if the change keeps its mean and spread."""
     if change.cut_off:
         return math.nan  # more of them are cut off as well
     lost = change.lost + change.gained > 0
     room = abs(limit - abs(change.difference.value))
     # Where no run differs an interval shrinks with their number, else with its root.
-    power = 1 if change.identical else 2
+    power = 1 if change.has_only_identical_runs else 2
     more = (change.half_width / room) ** power if room > 0.0 else math.inf
     if change.events < FEW_EVENTS:
         more = max(more, FEW_EVENTS / change.events if change.events else math.inf)
@@ -180,7 +184,9 @@ def _units_needed(change: PairedChange, limit: float) -> float:
     return math.ceil(wanted / digits) * digits
 
 
-def is_on_cost_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]) -> list[bool]:
+def flag_verdicts_on_cost_front(
+    verdicts: Sequence[ModelVerdict], costs: Mapping[str, float]
+) -> list[bool]:
     """Return for each verdict whether its model is on the front of CPU cost against largest
     possible change: no other model is at least as good in both and better in one.
 
@@ -194,7 +200,8 @@ def is_on_cost_front(verdicts: Sequence[ModelVerdict], costs: Mapping[str, float
         known = cost == cost and verdict.kind != NOTHING
         points.append((cost, verdict.weight if known else math.nan))
     return [
-        best and point != points[0] for point, best in zip(points, is_on_front(points), strict=True)
+        best and point != points[0]
+        for point, best in zip(points, flag_points_on_front(points), strict=True)
     ][1:]
 
 

@@ -65,12 +65,12 @@ def instants_to_seconds(values: Any) -> Any:
     return values.ticks / values.ticks_per_s if isinstance(values, Instants) else values
 
 
-def null_float_column(rows: int) -> AnyArray:
+def shared_nan_column(rows: int) -> AnyArray:
     """Return a float64 column of `rows` NaN values, which are stored once."""
     return _NANS[:rows]
 
 
-def is_null_column(values: Any) -> bool:
+def is_shared_nan_column(values: Any) -> bool:
     """Return whether a column is the shared NaN column (all rows null); values are not examined."""
     return isinstance(values, np.ndarray) and values.base is _NAN
 

@@ -38,8 +38,10 @@ def rows_of_entries(offsets: IntArray) -> IntArray:
     return (counts > 0).nonzero()[0]
 
 
-def select_entries(offsets: IntArray, rows: slice | IntArray) -> tuple[IntArray, slice | IntArray]:
-    """Return offsets, from 0, of selected rows, and their entries' indices (slice if `rows` is)."""
+def selected_offsets_and_indices(
+    offsets: IntArray, rows: slice | IntArray
+) -> tuple[IntArray, slice | IntArray]:
+    """Return (selected rows' offsets, from 0; indices of their entries, a slice if `rows` is)."""
     if isinstance(rows, slice):
         start, stop, _ = rows.indices(len(offsets) - 1)
         stop = max(start, stop)

@@ -77,8 +77,8 @@ class KeyedTable:
             return self
         return self.take(np.argsort(self.replica, kind="stable"))
 
-    def _has_only_runs(self, runs: IntArray) -> bool:
-        """Return whether rows clearly belong to `runs`: to its only one, or one row for each."""
+    def _has_surely_only_runs(self, runs: IntArray) -> bool:
+        """Return True if all rows surely are of `runs` (its only one, or one row each)."""
         replica = self.replica
         if not len(replica) or replica[0] != runs[0] or replica[-1] != runs[-1]:
             return False
@@ -86,15 +86,15 @@ class KeyedTable:
 
     def rows_of_runs(self, runs: IntArray) -> Self:
         """Return the rows that belong to one of the given ascending runs."""
-        if len(self) == 0 or self._has_only_runs(runs):
+        if len(self) == 0 or self._has_surely_only_runs(runs):
             return self
         return self.take(np.isin(self.replica, runs))
 
-    def replace_runs(self, runs: IntArray, newer: Self, first_run: int) -> Self:
+    def replace_and_drop_earlier_runs(self, runs: IntArray, newer: Self, first_run: int) -> Self:
         """Return the table with its rows of `runs` replaced by `newer` and those of runs before
         `first_run` removed, sorted by run.
         """
-        if len(self) == 0 or self._has_only_runs(runs):
+        if len(self) == 0 or self._has_surely_only_runs(runs):
             return newer.sort()
         others = (self.replica >= first_run) & ~np.isin(self.replica, runs)
         return self.concatenate([self.take(others), newer]).sort()

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.sorted_union import sorted_union
+from dsa_des.arrays.sorted_union import sorted_union_and_positions
 from dsa_des.arrays.types import BoolArray, IntArray
 
 _ZERO = np.zeros((), dtype=np.int64)
@@ -27,7 +27,7 @@ _MANY = 64
 _LEAST_BITS = 44
 
 
-def single_run_numbers(rows: int) -> IntArray:
+def shared_zero_run_numbers(rows: int) -> IntArray:
     """Return the run number of `rows` rows of a single run: zeros, which are stored once."""
     return _ZEROS[:rows]
 
@@ -39,13 +39,13 @@ def is_shared_single_run(run: IntArray) -> bool:
 
 def take_runs(run: IntArray, rows: IntArray) -> IntArray:
     """Return the run numbers of the rows at the given indices."""
-    return single_run_numbers(len(rows)) if run.base is _ZERO else run[rows]
+    return shared_zero_run_numbers(len(rows)) if run.base is _ZERO else run[rows]
 
 
 def concatenate_runs(parts: Sequence[IntArray]) -> IntArray:
     """Return the runs of the rows of all parts, one after the other."""
     if all(part.base is _ZERO for part in parts):
-        return single_run_numbers(sum(map(len, parts)))
+        return shared_zero_run_numbers(sum(map(len, parts)))
     return np.concatenate(parts)
 
 
@@ -73,13 +73,15 @@ class RunTicks:
     @classmethod
     def empty(cls) -> "RunTicks":
         """Return an empty set of instants."""
-        return cls(single_run_numbers(0), np.empty(0, dtype=np.int64))
+        return cls(shared_zero_run_numbers(0), np.empty(0, dtype=np.int64))
 
     @classmethod
     def of_run(cls, run: int, tick: IntArray) -> "RunTicks":
         """Return instants of one run."""
         runs = (
-            single_run_numbers(len(tick)) if run == 0 else np.full(len(tick), run, dtype=np.int64)
+            shared_zero_run_numbers(len(tick))
+            if run == 0
+            else np.full(len(tick), run, dtype=np.int64)
         )
         return cls(runs, tick)
 
@@ -99,7 +101,9 @@ class RunTicks:
                 return self
         tick = self.tick[rows]
         return RunTicks(
-            single_run_numbers(len(tick)) if is_shared_single_run(self.run) else self.run[rows],
+            shared_zero_run_numbers(len(tick))
+            if is_shared_single_run(self.run)
+            else self.run[rows],
             tick,
         )
 
@@ -144,12 +148,12 @@ class RunTicks:
         """Return indices that sort by run and tick, stably; None if sorted already."""
         if len(self) < 2:
             return None
-        (key,) = _sortable_keys(self)[0]
+        (key,) = _sortable_keys_and_tick_bits(self)[0]
         if bool((key[1:] >= key[:-1]).all()):
             return None
         return np.argsort(key, kind="stable")
 
-    def running_latest(self) -> "RunTicks":
+    def running_largest_tick(self) -> "RunTicks":
         """Return the largest tick up to each row in its run; runs are sorted, ticks need not be."""
         if self.is_one_run:
             return RunTicks(self.run, np.maximum.accumulate(self.tick))
@@ -163,8 +167,8 @@ class RunTicks:
         parts = np.split(self.tick, self.first_position_of_runs[1:])
         return RunTicks(self.run, np.concatenate([np.maximum.accumulate(p) for p in parts]))
 
-    def count_before(self, run: int, tick: int) -> int:
-        """Return the number of instants before a tick of a run."""
+    def count_before_run_tick(self, run: int, tick: int) -> int:
+        """Return how many instants are before a tick of a run, earlier runs' all included."""
         if is_shared_single_run(self.run):
             return len(self) if run > 0 else int(np.searchsorted(self.tick, tick))
         first, last = np.searchsorted(self.run, [run, run + 1]).tolist()
@@ -182,7 +186,7 @@ def _is_same_run(parts: Sequence[RunTicks]) -> bool:
     return not filled or all(run[0] == filled[0][0] == run[-1] for run in filled)
 
 
-def _sortable_keys(*parts: RunTicks) -> tuple[list[IntArray], int]:
+def _sortable_keys_and_tick_bits(*parts: RunTicks) -> tuple[list[IntArray], int]:
     """Return for each part one integer per instant that sorts like (run, tick), and how many low
     bits of it are the tick (-1 where it has no such bits).
 
@@ -229,12 +233,12 @@ def union_of_instants(parts: Sequence[RunTicks]) -> RunTicks:
         if put_together == set(parts):  # the same objects
             return known
     if _is_same_run(parts):
-        ticks, positions = sorted_union([part.tick for part in parts])
+        ticks, positions = sorted_union_and_positions([part.tick for part in parts])
         run = next((int(part.run[0]) for part in parts if len(part)), 0)
         instants = RunTicks.of_run(run, ticks)
     else:
-        keys, bits = _sortable_keys(*parts)
-        every, positions = sorted_union(keys)
+        keys, bits = _sortable_keys_and_tick_bits(*parts)
+        every, positions = sorted_union_and_positions(keys)
         if bits < 0:
             rows = np.empty(len(every), dtype=np.int64)
             rows[np.concatenate(positions)] = np.arange(sum(map(len, parts)))
@@ -260,10 +264,10 @@ def _remembered_positions(instants: RunTicks, part: RunTicks) -> IntArray | None
 
 def last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> IntArray:
     """Return the index in `instants` of the last at or before each of `asked` in its run, or -1."""
-    return _last_position_at_or_before(instants, asked)[0]
+    return _last_positions_and_all_known(instants, asked)[0]
 
 
-def _last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
+def _last_positions_and_all_known(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
     """Return the index of the latest instant of the same run at or before each asked one (or -1),
     and whether all asked ones are known to be in `instants`.
     """
@@ -276,7 +280,7 @@ def _last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> tuple[In
         return known, True
     one_run = _is_same_run((instants, asked))
     known_keys, keys = (
-        (instants.tick, asked.tick) if one_run else _sortable_keys(instants, asked)[0]
+        (instants.tick, asked.tick) if one_run else _sortable_keys_and_tick_bits(instants, asked)[0]
     )
     # As for blocks that run at the same instants; a search would take a tenth of a whole run.
     same = there == count >= _MANY and bool((known_keys == keys).all())
@@ -293,8 +297,10 @@ def _last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> tuple[In
 def positions_with_found_mask(
     instants: RunTicks, asked: RunTicks
 ) -> tuple[IntArray, BoolArray | None]:
-    """Return each asked instant's index in `instants`, and a mask of those there (None: all)."""
-    positions, met = _last_position_at_or_before(instants, asked)
+    """Return the index in `instants` of the last at or before each asked one in its run (else -1),
+    and a mask of those met exactly (None: all).
+    """
+    positions, met = _last_positions_and_all_known(instants, asked)
     if met or len(instants) == 0:
         return positions, None if met else np.zeros(len(asked), dtype=bool)
     there: BoolArray = (positions >= 0) & (instants.tick[positions] == asked.tick)
@@ -303,23 +309,24 @@ def positions_with_found_mask(
 
 def rank_instants(*parts: RunTicks) -> tuple[list[IntArray], int]:
     """Return, per part, its instants' ranks among all distinct ones, and the number of these."""
-    keys, _ = _sortable_keys(*parts)
+    keys, _ = _sortable_keys_and_tick_bits(*parts)
     every, rank = np.unique(np.concatenate(keys), return_inverse=True)
     ends = np.cumsum([len(key) for key in keys])[:-1]
     return np.split(rank.reshape(-1), ends), len(every)
 
 
 def first_position_at_or_after(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the index in `instants` of the first at or after each of `asked` in its run.
+    """Return the index in `instants` of the first at or after each of `asked` in its run; without
+    one, the index behind its run.
 
     Where its run has none so late it is the position behind the run's last one.
     """
     if _is_same_run((instants, asked)):
         return instants.tick.searchsorted(asked.tick)
-    keys, _ = _sortable_keys(instants, asked)
+    keys, _ = _sortable_keys_and_tick_bits(instants, asked)
     return keys[0].searchsorted(keys[1])
 
 
 def first_position_in_runs(instants: RunTicks, run: IntArray) -> IntArray:
-    """Return the index in `instants` of the first instant of each given run."""
+    """Return the index in `instants` of each given run's first instant, or where it would stand."""
     return instants.run.searchsorted(run)

@@ -11,7 +11,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 _Array = TypeVar("_Array", IntArray, FloatArray)
 
 
-def sorted_union(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
+def sorted_union_and_positions(arrays: Sequence[_Array]) -> tuple[_Array, list[IntArray]]:
     """Return every value once, ascending, and the position of each array's values among them.
 
     The arrays (n,), at least one, are in any order: whole numbers or doubles, no NaN. A stable sort

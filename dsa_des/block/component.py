@@ -256,7 +256,8 @@ class Component:
         return []
 
     def failure_counts(self) -> Mapping[str, tuple[int, int] | IntArray]:
-        """Return how often work was impossible: what was missing → (failures, cases).
+        """Return how often work failed for lack of something: what was missing → (failures, cases),
+        or an array (2, runs) of both by run.
 
         Asked after it has run; counts are over every row that it has seen. A block that serves all
         runs gives both of each run, (2, runs) (`dsa_des.record.failure_counts.count_cases`).
@@ -322,7 +323,8 @@ class Component:
     def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], "Component"]
     ) -> "Component | None":
-        """Return one component for all lock-step runs, or None if each needs its own.
+        """Return one component that computes all lock-step runs together, or None if each needs its
+        own, as ``make(run)`` gives it.
 
         Asked of a block that cannot be shared as it is, once it is set up. What it returns gets the
         rows of all runs, which may go side by side, and gives what each instance would. It must
@@ -343,7 +345,7 @@ class Component:
 
 
 def _is_defined_in_own_package(cls: type[Component], said: str) -> bool:
-    """Return whether attribute `said` is defined by a class of the same top-level package."""
+    """Return whether `cls` gets attribute `said` from a class of its own top-level package."""
     base = next(base for base in cls.__mro__ if said in vars(base))
     return base.__module__.partition(".")[0] == cls.__module__.partition(".")[0]
 

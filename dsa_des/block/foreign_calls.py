@@ -53,13 +53,13 @@ def describe_error(error: BaseException) -> str:
 _A_FOREIGN_PART = 3
 
 
-def error_with_line(error: BaseException, cls: type) -> str:
+def error_text_with_line(error: BaseException, cls: type) -> str:
     """Return an exception's type, text and innermost line in the class's own package.
 
     One that ends a command with 3 says all itself: a program or an FMU has failed, not the class.
     """
     if getattr(error, "exit_code", 1) == _A_FOREIGN_PART:
-        return str(error) or error_with_kind(error)
+        return str(error) or error_text_with_type(error)
     package = cls.__module__.partition(".")[0]
     trace, place = error.__traceback__, None
     while trace is not None:
@@ -68,10 +68,10 @@ def error_with_line(error: BaseException, cls: type) -> str:
             code = frame.f_code
             place = f"{code.co_filename}, line {trace.tb_lineno}, in {code.co_name}"
         trace = trace.tb_next
-    return error_with_kind(error) + ("" if place is None else f" ({place})")
+    return error_text_with_type(error) + ("" if place is None else f" ({place})")
 
 
-def error_with_kind(error: BaseException) -> str:
+def error_text_with_type(error: BaseException) -> str:
     """Return an exception's type and text, such as ``SystemExit: 0``."""
     try:
         text = str(error)
@@ -86,7 +86,7 @@ class ForeignFailure(Exception):
 
 @contextmanager
 def wrap_foreign_errors(*expected: type[Exception]) -> Iterator[None]:
-    """Turn whatever is raised inside, ctrl-C by the user excepted, into `ForeignFailure`.
+    """Turn what is raised inside into `ForeignFailure`; `expected` and stop requests pass.
 
     The exception itself is its ``__cause__``. Those `expected` pass.
     """
@@ -101,7 +101,7 @@ def wrap_foreign_errors(*expected: type[Exception]) -> Iterator[None]:
                 raise
             if not isinstance(error, KeyboardInterrupt) and is_stop_request(error):
                 raise
-            raise ForeignFailure(error_with_kind(error)) from error
+            raise ForeignFailure(error_text_with_type(error)) from error
 
 
 @contextmanager

@@ -40,7 +40,7 @@ NEUTRAL = (
 _FURTHER = ("d", "<", ">", "8", "*")
 
 
-def marks_of(classes: Mapping[str, type | None]) -> dict[str, Mark]:
+def plot_mark_by_name(classes: Mapping[str, type | None]) -> dict[str, Mark]:
     """Return name → plot mark (colour and marker): that of the block's class, or neutral."""
     own = {name: getattr(cls, "mark", None) for name, cls in classes.items()}
     return distinguish_marks(

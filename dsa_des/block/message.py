@@ -11,13 +11,17 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from dsa_des.arrays.column_values import Columns, Text, join_values, null_float_column, pick_rows
-from dsa_des.arrays.entries import offsets_from_entry_rows, rows_of_entries, select_entries
+from dsa_des.arrays.column_values import Columns, Text, join_values, pick_rows, shared_nan_column
+from dsa_des.arrays.entries import (
+    offsets_from_entry_rows,
+    rows_of_entries,
+    selected_offsets_and_indices,
+)
 from dsa_des.arrays.run_ticks import (
     RunTicks,
     concatenate_runs,
     is_shared_single_run,
-    single_run_numbers,
+    shared_zero_run_numbers,
 )
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.recorded_columns import (
@@ -29,10 +33,10 @@ from dsa_des.block.recorded_columns import (
     column,
     columns,
     columns_of_dataclass,
-    instant_columns,
     per_entry,
     per_row,
     static,
+    tick_and_replica_columns,
 )
 
 __all__ = [
@@ -47,12 +51,12 @@ __all__ = [
     "columns",
     "columns_of_dataclass",
     "derive_columns",
-    "instant_columns",
     "offsets_from_entry_rows",
     "per_entry",
     "per_row",
     "slice_columns",
     "static",
+    "tick_and_replica_columns",
 ]
 
 #: Numbers and truth values; no objects, no text.
@@ -64,7 +68,7 @@ _LAYOUTS: dict[type, tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]] =
 _DERIVED: dict[type, DerivedColumns] = {}
 
 
-def _row_entry_static_fields(
+def _row_entry_static_field_names(
     message_type: type,
 ) -> tuple[tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
     if message_type not in _LAYOUTS:
@@ -151,7 +155,7 @@ class Message(_Found):
         for name, kind in derive_columns(type(self)).optional.items():
             if getattr(self, name) is None:
                 count = int(self.offsets[-1])  # type: ignore[attr-defined]
-                none = null_float_column(count) if kind == "float64" else np.zeros(count, np.int64)
+                none = shared_nan_column(count) if kind == "float64" else np.zeros(count, np.int64)
                 setattr(self, name, none)
 
     def __len__(self) -> int:
@@ -165,7 +169,7 @@ class Message(_Found):
 
     def _runs(self) -> IntArray:
         """Return the run number of each row; zeros where the message has none."""
-        return single_run_numbers(len(self.tick)) if self.run is None else self.run
+        return shared_zero_run_numbers(len(self.tick)) if self.run is None else self.run
 
     @property
     def instants(self) -> RunTicks:
@@ -218,7 +222,10 @@ class Message(_Found):
         TypeError, ValueError
             With the class, the field, its length and that which it must have.
         """
-        rows, (row_names, entry_names, _) = len(self.tick), _row_entry_static_fields(type(self))
+        rows, (row_names, entry_names, _) = (
+            len(self.tick),
+            _row_entry_static_field_names(type(self)),
+        )
         self.run = self._runs()
         if len(self.run) != rows:
             raise ValueError(f"{_describe_field(self, 'run')} has {len(self.run)} of {rows} rows")
@@ -248,17 +255,17 @@ class Message(_Found):
                 return self.take(np.arange(start, stop, step))
             if start == 0 and stop == len(self):
                 return self
-        row_names, entry_names, _ = _row_entry_static_fields(type(self))
+        row_names, entry_names, _ = _row_entry_static_field_names(type(self))
         result = self._copy()
         values = result.__dict__
         for name in row_names:
             values[name] = pick_rows(values[name], rows)
         run = self._runs()
         result.run = (
-            single_run_numbers(len(result.tick)) if is_shared_single_run(run) else run[rows]
+            shared_zero_run_numbers(len(result.tick)) if is_shared_single_run(run) else run[rows]
         )
         if entry_names or "offsets" in values:
-            values["offsets"], index = select_entries(values["offsets"], rows)
+            values["offsets"], index = selected_offsets_and_indices(values["offsets"], rows)
             for name in entry_names:
                 values[name] = pick_rows(values[name], index)
         return result
@@ -266,7 +273,7 @@ class Message(_Found):
     def reorder(self, order: IntArray) -> Self:
         """Return the message with its entries in another order, each still of its row."""
         result = self._copy()
-        for name in _row_entry_static_fields(type(self))[1]:
+        for name in _row_entry_static_field_names(type(self))[1]:
             setattr(result, name, pick_rows(getattr(self, name), order))
         return result
 
@@ -293,7 +300,8 @@ class Message(_Found):
             if any(mine[name].keys() != others[name].keys() for name in names):
                 return False
         return all(
-            mine.get(name) is others.get(name) for name in _row_entry_static_fields(type(self))[2]
+            mine.get(name) is others.get(name)
+            for name in _row_entry_static_field_names(type(self))[2]
         )
 
     def tables(self) -> dict[str, Columns]:
@@ -304,17 +312,18 @@ class Message(_Found):
         return derive_columns(type(self)).tables(self)
 
     def repeat_rows(self, of: Self, source: IntArray, later_s: FloatArray) -> Self:
-        """Return this message with entries of the rows of `of`, as if they were measured again.
+        """Return this message with, in row i, the entries of row ``source[i]`` of `of` (none if
+        below 0), as if measured again ``later_s[i]`` later.
 
         Row i has those of row ``source[i]`` of the other, ``later_s[i]`` older; none where that is
         below 0. What rows say besides stays.
         """
-        offsets, index = select_entries(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
+        offsets, index = selected_offsets_and_indices(of.offsets, np.maximum(source, 0))  # type: ignore[attr-defined]
         there = np.repeat(source >= 0, np.diff(offsets))
         result = of.reorder(np.asarray(index)[there])
         for name in (
-            *_row_entry_static_fields(type(self))[0],
-            *_row_entry_static_fields(type(self))[2],
+            *_row_entry_static_field_names(type(self))[0],
+            *_row_entry_static_field_names(type(self))[2],
         ):
             setattr(result, name, getattr(self, name))
         result.run = self._runs()
@@ -323,7 +332,8 @@ class Message(_Found):
         return result
 
     def with_stuck_bit(self, rows: BoolArray, quantity: str, worth: float) -> Self:
-        """Return the message with a bit of `quantity` set at mask `rows`; by default unchanged.
+        """Return the message with one bit of `quantity`, worth `worth` in its unit, set in the rows
+        of a mask; by default unchanged.
 
         `quantity` is one of `may_stick`, and `worth` what the bit is worth in its unit.
         """
@@ -334,7 +344,7 @@ class Message(_Found):
         """Return one message with the rows of all parts, in the order given."""
         if len(parts) == 1:
             return parts[0]
-        row_names, entry_names, _ = _row_entry_static_fields(type(parts[0]))
+        row_names, entry_names, _ = _row_entry_static_field_names(type(parts[0]))
         # Static fields come from the last part: what a wire held before its first message may
         # know less than a real one.
         result = parts[-1]._copy()

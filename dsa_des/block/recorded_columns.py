@@ -82,7 +82,7 @@ def per_entry(**kwargs: Any) -> Any:
 
 
 def static(**kwargs: Any) -> Any:
-    """Declare a field that is the same for all rows."""
+    """Declare a field with one value for the whole message, not one per row; it is not recorded."""
     return field(metadata={"per": STATIC}, **kwargs)
 
 
@@ -126,7 +126,7 @@ def column(
     ValueError
         If the column is of no kind that can be recorded.
     """
-    filled = {name: Column(unit, frame, meaning, _check_kind(kind))}
+    filled = {name: Column(unit, frame, meaning, _checked_kind(kind))}
     how = Filled(filled, False, value, in_entries, for_entries, instant)
     return field(metadata={"per": of, _RECORDED: how}, **kwargs)
 
@@ -149,7 +149,7 @@ def columns(
         As for `column`.
     """
     for one in recorded.values():
-        _check_kind(one.kind)
+        _checked_kind(one.kind)
     how = Filled(dict(recorded), True, value, False, for_entries)
     return field(metadata={"per": of, _RECORDED: how}, **kwargs)
 
@@ -159,11 +159,11 @@ def columns_of_dataclass(group: type) -> dict[str, Column]:
     found: dict[str, Column] = {}
     for item in fields(group):
         how: Filled = item.metadata[_RECORDED]
-        found.update(zip(_names(item.name, how), how.columns.values(), strict=True))
+        found.update(zip(_column_names(item.name, how), how.columns.values(), strict=True))
     return found
 
 
-def _check_kind(kind: str) -> str:
+def _checked_kind(kind: str) -> str:
     if kind not in _KINDS:
         raise ValueError(f"column is {kind!r}: it must be one of {', '.join(_KINDS)}")
     return kind
@@ -173,7 +173,7 @@ def _check_kind(kind: str) -> str:
 _RECORDED = "recorded"
 
 
-def instant_columns(message: Any, row: IntArray | None = None) -> Columns:
+def tick_and_replica_columns(message: Any, row: IntArray | None = None) -> Columns:
     """Return the columns ``tick`` and, if there are several runs, ``replica``: for each row of a
     message, or for each entry if `row` gives its row.
     """
@@ -215,17 +215,17 @@ class DerivedColumns:
             if how is None:
                 continue
             if item.metadata["per"] == PER_ENTRY:
-                self._add("entry_table", self._entries, name, how)
+                self._add_recorded_field("entry_table", self._entries, name, how)
                 if item.default is None and not (how.many or how.instant):
                     self.optional[name] = next(iter(how.columns.values())).kind
                 continue
-            self._add("row_table", self._rows, name, how)
+            self._add_recorded_field("row_table", self._rows, name, how)
             if how.in_entries:
-                self._add("entry_table", self._entries, name, how)
+                self._add_recorded_field("entry_table", self._entries, name, how)
             if how.for_entries:
-                self.for_entries.update(dict.fromkeys(_names(name, how), self._entry_table))
+                self.for_entries.update(dict.fromkeys(_column_names(name, how), self._entry_table))
 
-    def _add(
+    def _add_recorded_field(
         self, which: str, filled: list[tuple[str, Filled]], field_name: str, how: Filled
     ) -> None:
         owner = self._type.__qualname__
@@ -233,7 +233,7 @@ class DerivedColumns:
         if not table:
             raise TypeError(f"{owner}.{field_name} fills a column, but the class names no {which}")
         known = self.recorded.setdefault(table, {})
-        for name, one in zip(_names(field_name, how), how.columns.values(), strict=True):
+        for name, one in zip(_column_names(field_name, how), how.columns.values(), strict=True):
             if name in known:
                 raise TypeError(f"{owner} has two fields for column {name!r}")
             known[name] = one
@@ -260,11 +260,11 @@ class DerivedColumns:
         tables: dict[str, Columns] = {}
         if self._rows:
             tables[self._row_table] = self._fill_columns(
-                message, self._rows, instant_columns(message)
+                message, self._rows, tick_and_replica_columns(message)
             )
         if self._entries:
             row = message.row_of_entries
-            made = instant_columns(message, row)
+            made = tick_and_replica_columns(message, row)
             tables[self._entry_table] = self._fill_columns(message, self._entries, made, row)
         return tables
 
@@ -287,7 +287,7 @@ class DerivedColumns:
                 values = Instants(values, getattr(message, "ticks_per_s", _NANOSECONDS))
             if how.in_entries and row is not None:
                 values = _values_at_entries(values, row)
-            made[_names(name, how)[0]] = values
+            made[_column_names(name, how)[0]] = values
         for name, how in dicts:
             held = getattr(message, name) if how.value is None else how.value(message)
             if not held:
@@ -302,7 +302,7 @@ class DerivedColumns:
         return made
 
 
-def _names(field_name: str, how: Filled) -> list[str]:
+def _column_names(field_name: str, how: Filled) -> list[str]:
     return [name or field_name for name in how.columns]
 
 

@@ -14,9 +14,9 @@ from dsa_des.block.message import Message
 from dsa_des.block.shadowed_packages import (
     NotAllowed,
     NotImportable,
-    is_ours,
+    import_named_object,
+    is_own_entry_point,
     load_entry_point,
-    load_named,
     load_unnamed_entry_point,
 )
 from dsa_des.errors import did_you_mean
@@ -123,13 +123,15 @@ def find_component(type_name: str, key: str = "", beside: Sequence[Path] = ()) -
         raise UnknownType(f"unknown block type{hint} (or module:Class)")
     try:
         found = (
-            load_named(type_name, key, beside) if point is None else load_entry_point(point, key)
+            import_named_object(type_name, key, beside)
+            if point is None
+            else load_entry_point(point, key)
         )
     except NotAllowed as error:
         raise NotImported(str(error)) from None
     except NotImportable as error:
         raise UnknownType(str(error)) from error.__cause__
-    if point is not None and is_ours(point):
+    if point is not None and is_own_entry_point(point):
         return _require_component(found)
     return _check_component_class(type_name, found)
 

@@ -17,8 +17,8 @@ from dsa_des.block import source_file
 from dsa_des.block.foreign_calls import ForeignFailure, wrap_foreign_errors
 from dsa_des.block.source_file import (
     append_to_module_path,
-    file_of,
-    find_conflicting_module,
+    file_of_module,
+    files_of_conflicting_modules,
     folders_for_module,
     module_search_folders,
     remember_module_folder,
@@ -30,7 +30,7 @@ _HOME = Path(__file__).parents[2]
 
 
 def refuse_hidden_module(module_name: str) -> None:
-    """Raise UsageError if a package of the same name would hide one of our own modules."""
+    """Raise UsageError if a foreign module's top-level name would hide a package of ours."""
     top = module_name.partition(".")[0]
     ours = _HOME / top
     found = _location_of_module(top)
@@ -94,7 +94,7 @@ class Imports:
     announce: Callable[[Foreign], None] | None = None
     seen: set[Foreign] = field(default_factory=set)
 
-    def announce_import(self, foreign: Foreign) -> None:
+    def announce_or_refuse_import(self, foreign: Foreign) -> None:
         """Announce a foreign module once; NotAllowed if foreign modules may not be imported."""
         if self.announce is not None and foreign not in self.seen:
             self.seen.add(foreign)
@@ -117,7 +117,7 @@ def import_policy(policy: Imports) -> Iterator[Imports]:
         _IMPORTS.reset(token)
 
 
-def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
+def import_named_object(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
     """Return what ``module:Class`` or ``./file.py:Class`` names; `NotImportable` if it cannot be.
 
     A name that knows the folder it was written in (`SourcedText`) is looked for there, too, and in
@@ -134,9 +134,9 @@ def load_named(name: str, key: str = "", beside: Sequence[Path] = ()) -> Any:
     beside = (*([Path(name.folder)] if hasattr(name, "folder") else []), *beside)
     policy = _IMPORTS.get()
     if policy.announce is not None or not policy.allowed:
-        file = file_of(module_name, beside) if path is None else str(path)
+        file = file_of_module(module_name, beside) if path is None else str(path)
         short = module_name if path is None else path.stem
-        policy.announce_import(Foreign(key, name, short, file))
+        policy.announce_or_refuse_import(Foreign(key, name, short, file))
     module = _import_module(module_name, beside) if path is None else _import_file(path)
     try:
         with wrap_foreign_errors():
@@ -157,22 +157,25 @@ def load_entry_point(point: EntryPoint, key: str = "") -> Any:
     Raises NotImportable if it cannot be imported, and UsageError if it is ours and another package
     hides it.
     """
-    if is_ours(point):
+    if is_own_entry_point(point):
         refuse_hidden_module(point.module)
     elif key:
         policy = _IMPORTS.get()
         if policy.announce is not None or not policy.allowed:
-            policy.announce_import(Foreign(key, point.name, point.module, file_of(point.module)))
+            policy.announce_or_refuse_import(
+                Foreign(key, point.name, point.module, file_of_module(point.module))
+            )
     try:
         with wrap_foreign_errors(), _redirect_stdout_to_stderr(point.module):
             return point.load()
     except ForeignFailure as error:
-        what = f"cannot be imported from {point.value} ({file_of(point.module)}): {error}"
+        what = f"cannot be imported from {point.value} ({file_of_module(point.module)}): {error}"
         raise NotImportable(what) from error.__cause__
 
 
 def load_unnamed_entry_point(point: EntryPoint) -> Any:
-    """Import and return an entry point's object no file names, such as a report or command.
+    """Import and return an entry point's object that no scene names, such as a report or command;
+    UsageError if that fails.
 
     UsageError if it cannot be imported.
     """
@@ -184,13 +187,13 @@ def load_unnamed_entry_point(point: EntryPoint) -> Any:
         raise UsageError(message) from error.__cause__
 
 
-def is_ours(point: EntryPoint) -> bool:
+def is_own_entry_point(point: EntryPoint) -> bool:
     """Return whether this package itself registered an entry point."""
-    return point.dist is None or _distribution_name(point.dist) == _OURS
+    return point.dist is None or _normalised_distribution_name(point.dist) == _OURS
 
 
 @lru_cache(maxsize=64)
-def _distribution_name(distribution: Distribution) -> str:
+def _normalised_distribution_name(distribution: Distribution) -> str:
     """Return a distribution's name in lower case with ``-`` in place of ``_``."""
     return distribution.name.lower().replace("_", "-")
 
@@ -198,7 +201,7 @@ def _distribution_name(distribution: Distribution) -> str:
 def _import_module(module_name: str, beside: Sequence[Path]) -> Any:
     top = module_name.partition(".")[0]
     folders = module_search_folders(beside)
-    if others := find_conflicting_module(top, folders):
+    if others := files_of_conflicting_modules(top, folders):
         raise NotImportable(
             f"module {top!r} was imported from {others[0]} before, which {others[1]} is not: "
             "name that ./FILE.py:CLASS"
@@ -229,7 +232,7 @@ def _import_file(path: Path) -> Any:
 
 
 def _explain_failure(module_name: str, beside: Sequence[Path], error: ForeignFailure) -> str:
-    cause, file = error.__cause__, file_of(module_name, beside)
+    cause, file = error.__cause__, file_of_module(module_name, beside)
     missing = (cause.name or "") if isinstance(cause, ModuleNotFoundError) else ""
     if missing and (module_name == missing or module_name.startswith(f"{missing}.")):
         others = [folder for folder in module_search_folders(beside)[1:] if Path(folder).is_dir()]
@@ -254,7 +257,7 @@ def _describe_shadowed_folder(module_name: str) -> str:
     """
     top, *rest = module_name.split(".")
     here = Path.cwd() / top
-    found = file_of(top)
+    found = file_of_module(top)
     if not rest or not here.is_dir() or Path(found).parent == here:
         return ""
     return f": {top} is the installed {found}, not the folder {here}; give that another name"
@@ -279,7 +282,7 @@ class _Shown(io.TextIOBase):
         return True
 
     def write(self, text: str) -> int:
-        """Print whole lines of `text`, each with the module's name."""
+        """Print all ended lines, each after the module's name; return the length of `text`."""
         from dsa_des.terminal.terminal import say
 
         *lines, self._rest = (self._rest + text).split("\n")
@@ -287,7 +290,7 @@ class _Shown(io.TextIOBase):
             say(f"{self._module_name}: {line}", err=True)
         return len(text)
 
-    def finish(self) -> None:
+    def print_unfinished_line(self) -> None:
         """Print the last line if it was not ended."""
         if self._rest:
             self.write("\n")
@@ -301,4 +304,4 @@ def _redirect_stdout_to_stderr(module_name: str) -> Iterator[None]:
         with contextlib.redirect_stdout(shown):
             yield
     finally:
-        shown.finish()
+        shown.print_unfinished_line()

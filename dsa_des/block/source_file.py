@@ -45,10 +45,10 @@ def append_to_module_path(folders: Sequence[str]) -> Iterator[None]:
 
 def folders_for_module(top: str, folders: Sequence[str]) -> Sequence[str]:
     """Return the folders to search for a module; none if it is installed."""
-    return folders if _FOUND.get(top) in folders or not is_installed(top) else ()
+    return folders if _FOUND.get(top) in folders or not is_imported_or_importable(top) else ()
 
 
-def is_installed(top: str) -> bool:
+def is_imported_or_importable(top: str) -> bool:
     """Return whether a module is imported already or can be found on ``sys.path``."""
     try:
         return top in sys.modules or importlib.util.find_spec(top) is not None
@@ -64,8 +64,8 @@ def remember_module_folder(top: str, folders: Sequence[str]) -> None:
             return
 
 
-def find_conflicting_module(top: str, folders: Sequence[str]) -> tuple[str, str] | None:
-    """Return the files of the imported module and of a different one of that name meant now.
+def files_of_conflicting_modules(top: str, folders: Sequence[str]) -> tuple[str, str] | None:
+    """Return (file of the imported module, file that its name means now); None if they are one.
 
     None if what was imported is meant.
     """
@@ -78,7 +78,7 @@ def find_conflicting_module(top: str, folders: Sequence[str]) -> tuple[str, str]
     return loaded, meant.origin
 
 
-def file_of(module_name: str, beside: Iterable[Path] = ()) -> str:
+def file_of_module(module_name: str, beside: Iterable[Path] = ()) -> str:
     """Return the file that a module is imported from, without importing anything.
 
     Where there is none: ``there is no such module``, or the kind of module it is.

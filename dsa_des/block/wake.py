@@ -199,10 +199,10 @@ def checked_messages(
         if len(message.tick) == 0:
             continue
         message.check()
-        yield port, _set_runs(port, message, ran)
+        yield port, _with_run_numbers(port, message, ran)
 
 
-def _set_runs(port: str, message: Message, ran: RunTicks) -> Message:
+def _with_run_numbers(port: str, message: Message, ran: RunTicks) -> Message:
     """Return the message with the run number of each row, set here if the block did not set it.
 
     Rows that are not of instants at which the block ran, in order, are refused: what a row is dated

@@ -27,7 +27,7 @@ from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.examples import Example, examples
 from dsa_des.terminal import terminal
 from dsa_des.terminal.terminal import say
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 _PARAMETER_HEADS = ("  name", "type", "unit", "default", "meaning")
 
@@ -52,7 +52,7 @@ def show_components(name: str | None, key: str | None = None) -> None:
     table = scene_tables().get(name)
     if table is not None:
         what, rows = table
-        _describe_table(console, name, what, lambda: _rows_of_key(name, key, rows()))
+        _print_scene_table(console, name, what, lambda: _rows_of_key(name, key, rows()))
         return
     try:
         cls = find_component(name)
@@ -94,7 +94,7 @@ def _print_type_list(console: Any, names: typing.Sequence[str]) -> None:
     console.print(table)
 
 
-def _describe_table(
+def _print_scene_table(
     console: Any, name: str, what: str, rows: typing.Callable[[], list[typing.Any]]
 ) -> None:
     console.print(Text.assemble((name, "bold"), f"  {what}"))
@@ -125,7 +125,11 @@ def _first_sentence(cls: type[Component]) -> str:
 
 
 def _print_type(console: Any, name: str, cls: type[Component]) -> None:
-    console.print(Text.assemble((printable(name), "bold"), f"  {printable(cls.import_path())}"))
+    console.print(
+        Text.assemble(
+            (escape_unprintable(name), "bold"), f"  {escape_unprintable(cls.import_path())}"
+        )
+    )
     console.print(Text(inspect.cleandoc(cls.__doc__ or "")))
     console.print()
     console.print(f"look-ahead windows: {'yes' if cls.windowed else 'no'}", highlight=False)
@@ -147,12 +151,12 @@ def _print_type(console: Any, name: str, cls: type[Component]) -> None:
     console.print()
     console.print("parameters", style="bold")
     _print_rows(console, _PARAMETER_HEADS, parameter_rows(cls.Parameters))
-    _describe_hooks(console, cls)
+    _print_hooks(console, cls)
     for ladder in cls.ladders:
-        _describe_ladder(console, ladder)
+        _print_ladder(console, ladder)
 
 
-def _describe_hooks(console: Any, cls: type[Component]) -> None:
+def _print_hooks(console: Any, cls: type[Component]) -> None:
     """Print the quantities that effects can act on, their call, and which effects do."""
     hooks = cls.all_hooks()
     if not hooks:
@@ -167,7 +171,7 @@ def _describe_hooks(console: Any, cls: type[Component]) -> None:
     _print_rows(console, ("  hook", "what it calls", "effects"), rows)
 
 
-def _describe_ladder(console: Any, ladder: Ladder) -> None:
+def _print_ladder(console: Any, ladder: Ladder) -> None:
     units = ", ".join(f"{quantity.name} ({quantity.unit})" for quantity in ladder.quantities)
     console.print()
     console.print(f"ladder {ladder.name}, crude to exact; rungs differ in {units}", style="bold",
@@ -187,7 +191,7 @@ _OPTION = "--copy"
 _CODE = "__pycache__"
 
 
-def show_examples(copy: str | None) -> None:
+def list_or_copy_examples(copy: str | None) -> None:
     """Print a list of all shipped scenes, studies and cases, or copy their folders to `copy`."""
     if copy is not None:
         _copy_example_folders(user_path(copy, _OPTION))
@@ -223,7 +227,7 @@ def _copy_example_folders(target: Path) -> None:
             copied.mkdir()
             several = len(sources) > 1
             count = sum(
-                _copy_files(source, copied / source.parent.name if several else copied)
+                _copy_and_count_files(source, copied / source.parent.name if several else copied)
                 for source in sources
             )
             if path.exists():
@@ -236,7 +240,7 @@ def _copy_example_folders(target: Path) -> None:
     say(f"{target}: {count} files")
 
 
-def _copy_files(source: Path, into: Path) -> int:
+def _copy_and_count_files(source: Path, into: Path) -> int:
     """Copy all files below a folder (content, not permissions); return how many there were."""
     files = [path for path in sorted(source.rglob("*")) if path.is_file()]
     files = [path for path in files if _CODE not in path.parts]

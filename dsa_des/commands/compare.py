@@ -16,10 +16,10 @@ from dsa_des.commands.study import (
     check_workers,
     exit_if_runs_crashed,
     options_as_sets,
-    report_finished_study,
+    print_and_redraw_study,
     run_study_into_folder,
-    show_study,
     summarised_result_names,
+    write_and_print_finished_study,
 )
 from dsa_des.commands.what_changed import ConditionPair, print_changes, print_changes_along_axis
 from dsa_des.errors import UsageError, did_you_mean
@@ -41,9 +41,9 @@ from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.scene import load_scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.metric import METRICS
-from dsa_des.studies.runner import tables_of
+from dsa_des.studies.runner import result_tables_of_study
 from dsa_des.studies.study import MetricSpec, Study, portable_command_line
-from dsa_des.studies.study_digest import record_of, results_of
+from dsa_des.studies.study_digest import record_of, result_columns_of_study
 from dsa_des.studies.study_file import read_study, study_of_scene
 from dsa_des.terminal.tables import print_table
 from dsa_des.terminal.terminal import console, say
@@ -66,7 +66,7 @@ class _OfAll:
 
     def load_study(self, path: Path, swaps: Sequence[tuple[str, list[str]]] = ()) -> Study:
         """Return the study that a study file describes, or one made of a scene file."""
-        if _is_study(path):
+        if _is_study_file(path):
             sets = (*self.sets, *options_as_sets((), self.seed, self.replicas))
             return read_study(path, swaps, sets)
         replicas = _REPLICAS if self.replicas is None else self.replicas
@@ -118,12 +118,12 @@ def compare_command(
         exit_if_runs_crashed(tables, _ANEW)
         return
     if len(paths) == 1 and os.path.lexists(Path(paths[0]) / STUDY_JSON):
-        show_study(Path(paths[0]), results, _changes_printer(results))
+        print_and_redraw_study(Path(paths[0]), results, _changes_printer(results))
         return
     if len(paths) < 2:
         raise UsageError("give two or more studies or scenes, or one and --swap BLOCK=TYPE")
     files = [find_input_file(path) for path in paths]
-    studies = [_load_study(path, changes) for path in files]
+    studies = [_study_or_record_at_path(path, changes) for path in files]
     for study in studies:
         if isinstance(study, Study):
             study.repeat = portable_command_line(words, sets, *files)
@@ -134,7 +134,7 @@ def compare_command(
     with make_results_folder(out, _HOME, "compare") as home:
         for file, study in zip(files, studies, strict=True):
             if file.resolve() not in by_path:
-                by_path[file.resolve()] = _tables_of_path(file, study, workers, home)
+                by_path[file.resolve()] = _run_or_read_tables(file, study, workers, home)
         tables = [by_path[file.resolve()] for file in files]
         for number, (other, path) in enumerate(zip(tables[1:], paths[1:], strict=True), start=2):
             stem = "scatter" if len(tables) == 2 else f"scatter-{number}"
@@ -155,7 +155,7 @@ def _compare_swap(
     chosen: list[tuple[str, list[str]]] = []
     scene = (
         changes.load_study(path).scene(0)
-        if _is_study(path)
+        if _is_study_file(path)
         else load_scene(path, sets=changes.sets)
     )
     for swap in swaps:
@@ -172,13 +172,15 @@ def _compare_swap(
         chosen.append((block, [own, name]))
     study = changes.load_study(path, chosen)
     study.repeat = repeat
-    summarised_result_names(results_of(study), results)
+    summarised_result_names(result_columns_of_study(study), results)
     with make_results_folder(out, _HOME, "compare") as home:
         folder = run_study_into_folder(study, home, workers, resume=False, again=_ANEW)
-    tables = report_finished_study(study, folder, only=results, first=_changes_printer(results))
+    tables = write_and_print_finished_study(
+        study, folder, only=results, first=_changes_printer(results)
+    )
     block, (own, _) = chosen[0]
     for value, _, base, rows in tables.rows.comparisons_with_baseline(f"swap.{block}", own):
-        for metric in tables.notable_results(results):
+        for metric in tables.names_of_scatter_results(results):
             _list_farthest_runs(
                 metric, ConditionPair(tables, base, tables, rows), (own, str(value))
             )
@@ -189,12 +191,12 @@ def _changes_printer(results: Sequence[str]) -> Callable[[Tables], None]:
     return lambda tables: print_changes_along_axis(tables, results)
 
 
-def _is_study(path: Path) -> bool:
+def _is_study_file(path: Path) -> bool:
     data = read_scene_file(path).data
     return "scene" in data and "blocks" not in data
 
 
-def _load_study(path: Path, changes: _OfAll) -> Study | StudyRecord:
+def _study_or_record_at_path(path: Path, changes: _OfAll) -> Study | StudyRecord:
     """Return the study of a study file or scene file, or the record of finished runs."""
     if not _is_folder(path):
         return changes.load_study(path)
@@ -212,7 +214,7 @@ def _is_folder(path: Path) -> bool:
         return False
 
 
-def _tables_of_path(
+def _run_or_read_tables(
     path: Path, study: Study | StudyRecord, workers: int | None, home: Path
 ) -> Tables:
     """Return result tables of a folder of finished runs, or run the study below `home` first."""
@@ -221,7 +223,7 @@ def _tables_of_path(
     number = hashlib.sha256(os.fsencode(path.resolve())).hexdigest()[:6]
     target = home / f"{path.stem[:100]}-{number}"
     folder = run_study_into_folder(study, target, workers, resume=False, again=_ANEW)
-    return tables_of(study, folder)
+    return result_tables_of_study(study, folder)
 
 
 def _results_to_show(tables: Tables, only: Sequence[str]) -> list[str]:
@@ -270,10 +272,10 @@ def _print_comparison(
     headings = [*one.rows.axes, "result", "difference", "paired interval", "pairs",
              "unpaired interval"]  # fmt: skip
     lines: list[list[str]] = []
-    theirs = dict(other.rows.each_place())
+    theirs = dict(other.rows.row_indices_by_axis_values())
     places: list[tuple[str, ConditionPair]] = []
     together: dict[str, list[tuple[Any, Any]]] = {}
-    for at, rows in one.rows.each_place():
+    for at, rows in one.rows.row_indices_by_axis_values():
         if at not in theirs:
             continue
         runs = ConditionPair(one, rows, other, theirs[at])

@@ -9,15 +9,20 @@ from typing import Any
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.ladder import Ladder, Unavailable
 from dsa_des.block.registry import UnknownType, find_component
-from dsa_des.block.shadowed_packages import NotImportable, load_named
+from dsa_des.block.shadowed_packages import NotImportable, import_named_object
 from dsa_des.costs.climb import (
     Comparison,
     RungCost,
+    allowed_errors_by_unit,
     inapplicable_reason,
     measure_rungs,
-    parse_budgets,
 )
-from dsa_des.costs.cost_report import draw_costs, print_chain_and_notes, print_ladder, write_table
+from dsa_des.costs.cost_report import (
+    draw_error_against_cost,
+    print_chain_and_notes,
+    print_ladder,
+    write_rows_as_parquet,
+)
 from dsa_des.costs.replay import RungRun, run_with_recorded_wakes
 from dsa_des.costs.variants import Variants
 from dsa_des.errors import UsageError, did_you_mean
@@ -32,7 +37,7 @@ Climbs = list[tuple[str, Ladder]]
 _QUIET_S, _REPEATS = 10.0, 10
 
 
-def cost_of_accuracy(
+def measure_cost_of_accuracy(
     scene: str | None,
     sets: tuple[str, ...],
     swaps: tuple[str, ...],
@@ -74,8 +79,8 @@ def cost_of_accuracy(
     )
     variants.scene.dropped = variants.dropped
     print_notes(notes_of_loading(variants.scene))
-    climbs, notes = ladders_to_climb(variants, block, against)
-    limits = parse_budgets(budgets, [ladder for _, ladder in climbs])
+    climbs, notes = ladders_to_run_and_notes(variants, block, against)
+    limits = allowed_errors_by_unit(budgets, [ladder for _, ladder in climbs])
     target = OutputFolder.from_option(out, Path("runs"), f"{variants.scene.path.stem}-cost")
     compare = comparison_of_all_reports()
     costs: list[RungCost] = []
@@ -104,19 +109,21 @@ def cost_of_accuracy(
                 raise
             stopped = True
         rows = [cost.row() for cost in costs]
-        write_table(folder / "cost.parquet", rows)
+        write_rows_as_parquet(folder / "cost.parquet", rows)
         if not no_figures:
-            draw_costs(folder / "cost.png", variants.scene.title, costs)
+            draw_error_against_cost(folder / "cost.png", variants.scene.title, costs)
         if whole_chain and not stopped:
-            from dsa_des.costs.chain import draw_chain, run_rung_combinations
+            from dsa_des.costs.chain import draw_run_error_against_cost, run_rung_combinations
 
             progress.print_if_due("whole chain ...")
             chain, picked = run_rung_combinations(variants, costs, compare)
             notes.append(picked)
-            write_table(folder / "chain.parquet", chain)
+            write_rows_as_parquet(folder / "chain.parquet", chain)
             label = compare.difference.label
             if not no_figures:
-                draw_chain(folder / "chain.png", variants.scene.title, chain, label)
+                draw_run_error_against_cost(
+                    folder / "chain.png", variants.scene.title, chain, label
+                )
         content: dict[str, Any] = {"rows": rows, "notes": notes}
         if chain:
             content["chain"] = chain
@@ -165,7 +172,7 @@ class CostProgress:
             self._last_s = now_s
 
 
-def ladders_to_climb(
+def ladders_to_run_and_notes(
     variants: Variants, block: str | None, against: str | None
 ) -> tuple[Climbs, list[str]]:
     """Return (block, ladder) pairs to run, and notes on ladders that change nothing here."""
@@ -213,11 +220,11 @@ def comparison_of_all_reports() -> Comparison:
 
 def _draw_maps(name: str, out: str | None) -> None:
     """Draw the error maps of the ladders of one type, or of all types that begin with ``NAME.``."""
-    functions = _map_function_names()
+    functions = _error_map_name_by_family()
     if name not in functions:
         raise UsageError(f"--map {name}: no ladder draws such a map{did_you_mean(name, functions)}")
     try:
-        draw: Any = load_named(functions[name], "--map")
+        draw: Any = import_named_object(functions[name], "--map")
     except NotImportable as error:
         raise UsageError(f"--map {name}: {functions[name]} cannot be loaded: {error}") from error
     target = OutputFolder.from_option(out, Path("runs"), f"map-{name}")
@@ -227,7 +234,7 @@ def _draw_maps(name: str, out: str | None) -> None:
     say(f"{target.path}: {', '.join(paths)}")
 
 
-def _map_function_names() -> dict[str, str]:
+def _error_map_name_by_family() -> dict[str, str]:
     """Return family of block types (``geometry`` for ``geometry.*``) → name of its error map."""
     functions: dict[str, str] = {}
     for type_name in entry_points_of():

@@ -9,12 +9,17 @@ from typing import Any
 from dsa_des.answers.alternatives import (
     Alternatives,
     add_model_axis,
-    find_alternatives,
-    make_comparable_study,
+    find_models_to_compare,
+    same_replicas_study_and_notes,
 )
 from dsa_des.answers.changes import changes_by_model
-from dsa_des.answers.figure import draw_answers
-from dsa_des.answers.models_in_turns import Batch, TurnTimes, run_in_turns, split_into_batches
+from dsa_des.answers.figure import draw_changes_against_cpu
+from dsa_des.answers.models_in_turns import (
+    Batch,
+    TurnTimes,
+    run_all_models_in_turns,
+    split_into_batches,
+)
 from dsa_des.answers.report import AnswerReport, print_report
 from dsa_des.answers.verdicts import BEYOND, NOTHING, OPEN, Limit, parse_limits
 from dsa_des.commands.cost import CostProgress
@@ -26,7 +31,7 @@ from dsa_des.commands.study import (
     require_empty_or_resumed,
     summarised_result_names,
 )
-from dsa_des.costs.cost_report import write_table
+from dsa_des.costs.cost_report import write_rows_as_parquet
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
 from dsa_des.record.run_folder import write_run_json
@@ -34,9 +39,9 @@ from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import Result
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.scene.examples import find_input_file
-from dsa_des.studies.executors import default_workers, make_executor
+from dsa_des.studies.executors import make_executor, usable_processor_count
 from dsa_des.studies.study import Study, portable_command_line
-from dsa_des.studies.study_digest import results_of, study_json_text
+from dsa_des.studies.study_digest import result_columns_of_study, study_json_text
 from dsa_des.studies.study_file import read_study
 from dsa_des.terminal.terminal import say, say_json
 from dsa_des.text.safe_text import shell_line
@@ -45,7 +50,7 @@ from dsa_des.text.safe_text import shell_line
 _RUNS, _TURNS = "study", "turns.json"
 
 
-def cost_at_the_answer(
+def run_study_with_each_model(
     scene: str | None,
     answers: tuple[str, ...],
     sets: tuple[str, ...],
@@ -82,33 +87,37 @@ def cost_at_the_answer(
     sets = sets if duration is None else (*sets, f"set.duration_s={duration}")
     described = read_study(path, sets=sets)
     words = (
-        _as_options("answer", answers)
-        + _as_options("vary", listed)
-        + _as_options("budget", budgets)
+        _as_command_words("answer", answers)
+        + _as_command_words("vary", listed)
+        + _as_command_words("budget", budgets)
     )
-    words += _as_options("block", [block] if block else [])
-    words += _as_options("repeats", [str(repeats)] if repeats else [])
+    words += _as_command_words("block", [block] if block else [])
+    words += _as_command_words("repeats", [str(repeats)] if repeats else [])
     described.repeat = portable_command_line(["cost", *words], sets, described.path)
     answer = AnswerOfStudy(described, answers, block, listed, budgets, repeats)
     target = choose_output_folder(Path("runs"), f"{path.stem}-cost", out, resume)
     require_empty_or_resumed(target, resume, "what was begun there")
     folder = target if isinstance(target, Path) else target()
-    words += [*_as_options("workers", [str(workers)] if workers else []), "--out", str(folder)]
-    words += ["--no-figures"] * no_figures + ["--json"] * as_json + _as_options("set", sets)
+    words += [
+        *_as_command_words("workers", [str(workers)] if workers else []),
+        "--out",
+        str(folder),
+    ]
+    words += ["--no-figures"] * no_figures + ["--json"] * as_json + _as_command_words("set", sets)
     again = shell_line(["dsa-des", "cost", "--resume", *words, "--", scene])
     progress = CostProgress(silent=as_json)
-    stopped = answer.run(folder, workers or default_workers(), progress, resume)
+    stopped = answer.run(folder, workers or usable_processor_count(), progress, resume)
     if stopped and not answer.has_model_runs():
         exit_with_resume_hint("interrupted in the first turn", again, 130)
     report = answer.report()
     rows = report.rows()
-    said = {name: report.sentences(name) for name in report.verdicts}
+    said = {name: report.conclusion_sentences(name) for name in report.verdicts}
     content: dict[str, Any] = {"rows": rows, "sentences": said, "notes": report.notes_on_tables()}
     try:
-        write_table(folder / "answer.parquet", rows)
+        write_rows_as_parquet(folder / "answer.parquet", rows)
         write_file(folder / "answer.csv", _rows_to_csv(rows))
         if not no_figures:
-            draw_answers(folder / "answer.png", report)
+            draw_changes_against_cpu(folder / "answer.png", report)
         write_run_json(folder, {"title": described.title, "cost": content})
     except OSError as error:
         raise UsageError(f"{folder}: cannot be written: {error.strerror or error}") from error
@@ -119,10 +128,10 @@ def cost_at_the_answer(
         say()
         say(f"{folder}: {', '.join(sorted(one.name for one in folder.iterdir()))}")
     if stopped:
-        exit_with_resume_hint(f"interrupted after {answer.done_text()}", again, 130)
+        exit_with_resume_hint(f"interrupted after {answer.finished_turns_text()}", again, 130)
 
 
-def _as_options(option: str, values: Sequence[str]) -> list[str]:
+def _as_command_words(option: str, values: Sequence[str]) -> list[str]:
     return [word for value in values for word in (f"--{option}", value)]
 
 
@@ -138,21 +147,21 @@ class AnswerOfStudy:
         budgets: Sequence[str] = (),
         repeats: int | None = None,
     ) -> None:
-        results = results_of(study)
+        results = result_columns_of_study(study)
         summarised_result_names(results, answers, "--answer")
         self._results: list[Result] = [
             next(result for result in results if result.name == name)
             for name in dict.fromkeys(answers)
         ]
         self._limits: dict[str, Limit] = parse_limits(budgets, self._results)
-        plain, self._notes = make_comparable_study(study)
+        plain, self._notes = same_replicas_study_and_notes(study)
         axes = [axis.column for axis in plain.axes if axis.column not in plain.over]
         places = 1
         for axis in plain.axes:
             places *= 1 if axis.column in plain.over else len(axis.labels)
         self._axes, self._places = axes, places
-        self._refuse_one_run(plain)
-        found: Alternatives = find_alternatives(plain, block, listed, answers)
+        self._raise_if_only_one_unit(plain)
+        found: Alternatives = find_models_to_compare(plain, block, listed, answers)
         self._found = found
         if not found.these:
             whys = [*(f"  {name}: {why}" for name, why in found.unavailable)]
@@ -169,7 +178,7 @@ class AnswerOfStudy:
         self._failed: dict[str, str] = {}
         self._folder: StudyFolder | None = None
 
-    def _refuse_one_run(self, study: Study) -> None:
+    def _raise_if_only_one_unit(self, study: Study) -> None:
         members = len(study.cells) // self._places
         if members * study.replicas < 2 or (study.over and members < 2):
             unit = "encounter" if study.over else "run"
@@ -208,7 +217,7 @@ class AnswerOfStudy:
             report = self.report()
             going_on = done < len(self._batches)
             progress.print_if_due(
-                f"{self.done_text()}: {_verdict_counts_text(report)}", always=going_on
+                f"{self.finished_turns_text()}: {_verdict_counts_text(report)}", always=going_on
             )
             return left
 
@@ -220,7 +229,8 @@ class AnswerOfStudy:
                 f"{len(self._batches)} turns; the scene as it is goes first",
                 always=True,
             )
-            run_in_turns(self.study, folder, executor, workers, self._batches, self.turn_times,
+            run_all_models_in_turns(self.study, folder, executor, workers, self._batches,
+            self.turn_times,
                          announce_rest, next_models, before)  # fmt: skip
         except KeyboardInterrupt:
             return True
@@ -233,7 +243,7 @@ class AnswerOfStudy:
 
     def _resume_turns(self, path: Path) -> int:
         """Return how many turns an earlier attempt finished, and split the runs as it planned."""
-        kept = self.turn_times.read_earlier(path)
+        kept = self.turn_times.read_and_count_earlier_turns(path)
         if kept is None:
             return 0
         done, turns = kept
@@ -246,7 +256,7 @@ class AnswerOfStudy:
         """Return whether any model other than the scene's own has runs yet."""
         return any(model for _, model in self.turn_times.runs)
 
-    def _name(self, model: int) -> str:
+    def _model_name(self, model: int) -> str:
         return str(self.study.axes[-1].labels[model])
 
     def _remaining_models(self) -> list[int]:
@@ -256,15 +266,15 @@ class AnswerOfStudy:
             errors = table["error"].to_pylist()
             if all(error is not None for error in errors):
                 self._failed[table["model"].to_pylist()[0]] = str(errors[0])
-        if self._name(0) in self._failed:
+        if self._model_name(0) in self._failed:
             raise UsageError(
                 f"{self.study.path}: no run of the scene as it is has a result: "
-                f"{self._failed[self._name(0)]}"
+                f"{self._failed[self._model_name(0)]}"
             )
         return [k for k in range(len(self.study.axes[-1].labels))
-                if self._name(k) not in self._failed]  # fmt: skip
+                if self._model_name(k) not in self._failed]  # fmt: skip
 
-    def done_text(self) -> str:
+    def finished_turns_text(self) -> str:
         """Return how many turns are finished as text, such as ``2 of 10 turns``."""
         models = len(self._found.these) + 1 - len(self._failed)
         each = [
@@ -303,7 +313,7 @@ class AnswerOfStudy:
 
 def _verdict_counts_text(report: AnswerReport) -> str:
     every = [verdict for some in report.verdicts.values() for verdict in some]
-    taken = sum(verdict.is_acceptable for verdict in every)
+    taken = sum(verdict.is_same_or_within_limit for verdict in every)
     kinds = [(BEYOND, "beyond the limit"), (OPEN, "open"), (NOTHING, "not compared")]
     parts = [f"{taken} of {len(every)} may be taken"]
     parts += [

@@ -21,7 +21,7 @@ from dsa_des.files.output_names import describe_write_error
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.tables import Tables
 from dsa_des.scene.examples import find_input_file
-from dsa_des.studies.runner import tables_of
+from dsa_des.studies.runner import result_tables_of_study
 from dsa_des.studies.study import portable_command_line
 from dsa_des.terminal.terminal import say
 from dsa_des.text.safe_text import shell_line
@@ -67,7 +67,7 @@ def evidence_command(
         study.repeat = repeat
         path = target / STUDIES / name
         folders[name] = run_study_into_folder(study, path, workers, resume, again)
-        tables[name] = tables_of(study, folders[name])
+        tables[name] = result_tables_of_study(study, folders[name])
         tables[name].write()
     pack = Pack(checked, folders, tables, sets, encounters)
     evidence = pack.evidence()

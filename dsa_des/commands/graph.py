@@ -6,7 +6,7 @@ from typing import Any, Unpack
 
 import networkx as nx
 
-from dsa_des.commands.scene import SceneOptions, load_printing_notes
+from dsa_des.commands.scene import SceneOptions, load_scene_printing_notes
 from dsa_des.errors import OutputError, UsageError
 from dsa_des.files.output_file import PICTURES, check_file_ending, check_file_writable
 from dsa_des.files.output_names import user_path
@@ -16,14 +16,14 @@ from dsa_des.scene.graph import block_depths
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
 from dsa_des.terminal.terminal import console, say, say_lines
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 
 def show_graph(dot: bool, png: bool, out: str | None, **options: Unpack[SceneOptions]) -> None:
     """Print or draw the graph of a scene."""
     if dot and png:
         raise UsageError("give --dot or --png, not both")
-    loaded = load_printing_notes(**options)
+    loaded = load_scene_printing_notes(**options)
     if dot:
         say_lines(to_dot(loaded))
     elif png:
@@ -87,7 +87,7 @@ def to_dot(scene: Scene) -> str:
 
 
 def _escape_dot(text: str) -> str:
-    return printable(text).replace("\\", "\\\\").replace('"', '\\"')
+    return escape_unprintable(text).replace("\\", "\\\\").replace('"', '\\"')
 
 
 def draw_graph(scene: Scene, path: Path) -> None:

@@ -16,11 +16,11 @@ from typing import Any
 import click
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.foreign_calls import error_with_kind, module_of_error
+from dsa_des.block.foreign_calls import error_text_with_type, module_of_error
 from dsa_des.errors import BlockFailure, OutputError, SceneError, UsageError
 from dsa_des.terminal.interruption import exit_plainly_on_signal
 from dsa_des.terminal.terminal import say, say_lines
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 # Packages whose code may end a command; an exit from any other is an error.
 _OURS = ("dsa_des", "components", "click", "rich")
@@ -46,7 +46,7 @@ def plain_errors(command: Callable[..., None]) -> Callable[..., None]:
             module = module_of_error(error.__traceback__)
             if module.partition(".")[0] in _OURS:
                 raise
-            say(f"error: the module {module!r} left with {error_with_kind(error)}", err=True)
+            say(f"error: the module {module!r} left with {error_text_with_type(error)}", err=True)
             sys.exit(2)
         except BrokenPipeError:  # the reader of our output went away
             sys.stderr.close()
@@ -92,7 +92,7 @@ def _escape_click_errors() -> Iterator[None]:
         attributes = vars(error)  # click calls them final
         for name in ("message", "ui_filename"):
             if name in attributes:
-                attributes[name] = printable(attributes[name])
+                attributes[name] = escape_unprintable(attributes[name])
         raise
 
 

@@ -27,7 +27,7 @@ class _NotBack(Exception):
 
 
 def check_window_independence(loaded: Scene, again: Callable[..., Scene]) -> None:
-    """Raise SceneError if a foreign block's results depend on scans run singly or all at once."""
+    """Raise SceneError if a foreign block's results differ for scans run singly and together."""
     strangers = [
         name
         for name, block in loaded.blocks.items()

@@ -22,9 +22,9 @@ from dsa_des.running.reports import (
     warn_of_long_run,
 )
 from dsa_des.running.simulation import Simulation
-from dsa_des.scene.data_files import scene_of_data
+from dsa_des.scene.data_files import scene_from_data_file
 from dsa_des.scene.examples import find_input_file
-from dsa_des.scene.scene import Scene, load_scene, load_tables
+from dsa_des.scene.scene import Scene, load_scene, scene_from_tables
 from dsa_des.scene.scene_file import read_scene_tables
 from dsa_des.terminal import terminal
 from dsa_des.terminal.tables import print_table
@@ -42,7 +42,7 @@ class SceneOptions(TypedDict):
     duration: str | None
 
 
-def load_printing_notes(
+def load_scene_printing_notes(
     scene: str,
     sets: Iterable[str],
     swaps: Iterable[str],
@@ -52,12 +52,12 @@ def load_printing_notes(
 ) -> Scene:
     """Load and check a scene; print notes on standard error unless `noted` defers that."""
     path = find_input_file(scene, "scene")
-    data = scene_of_data(path)
+    data = scene_from_data_file(path)
     if data is None:
         loaded = load_scene(path, sets=sets, swaps=swaps, seed=seed, duration_s=duration)
     else:
         file = read_scene_tables(data.tables, path.name)
-        loaded = load_tables(file, sets, swaps, seed, duration)
+        loaded = scene_from_tables(file, sets, swaps, seed, duration)
         loaded.about = data.about
     if not noted:
         print_notes(notes_of_loading(loaded))
@@ -92,7 +92,7 @@ def run_scene(
 ) -> None:
     """Run a scene into a folder, then print its summary."""
     pacer = None if realtime is None else Pacer(parse_factor(realtime))
-    loaded = load_printing_notes(**options, noted=True)
+    loaded = load_scene_printing_notes(**options, noted=True)
     target = OutputFolder.from_option(out, Path("runs"), loaded.path.stem)
     summary = record_run(
         loaded,
@@ -143,7 +143,7 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
         pause_garbage_collection(),
         import_policy(Imports(allowed=not no_import, announce=announce)) as policy,
     ):
-        loaded = load_printing_notes(**options, noted=True)
+        loaded = load_scene_printing_notes(**options, noted=True)
         scene = options["scene"]
         for line in loaded.about:
             say(line)
@@ -155,7 +155,7 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
             )
             return
         simulation = Simulation(loaded)
-        check_window_independence(loaded, partial(load_printing_notes, **options, noted=True))
+        check_window_independence(loaded, partial(load_scene_printing_notes, **options, noted=True))
     warn_of_long_run(simulation)
     print_notes(notes_of_scene(simulation))
     clocks = [node for node in simulation.nodes.values() if node.clock is not None]
@@ -179,16 +179,16 @@ def check_scene_file(no_import: bool, **options: Unpack[SceneOptions]) -> None:
 _WIDE = 300
 
 
-def explain_scene(
+def print_effects_of_scene(
     measure: bool, simulate_everything: bool, **options: Unpack[SceneOptions]
 ) -> None:
     """Print a table of every block's effects; with `measure`, run the scene to time them."""
-    loaded = load_printing_notes(**options)
+    loaded = load_scene_printing_notes(**options)
     simulation = Simulation(loaded, simulate_everything=simulate_everything)
     shares = measure_effect_time_shares(loaded, simulate_everything) if measure else None
     console = terminal.console(_WIDE)  # no terminal: every sentence on one line
     # What the scene calls for stands first: most of what there is, it does not call for.
-    planned, rows = _plan_effects(simulation, 0, shares)
+    planned, rows = _planned_effects_and_rows(simulation, 0, shares)
     if not rows:
         console.print("No block of this scene declares effects.")
         return
@@ -197,7 +197,7 @@ def explain_scene(
     title = f"{shorten(loaded.title)}: {acting} effects simulated, {len(planned) - acting} not"
     print_table(console, title, headings, rows, group=0)
     for number, stretch in enumerate(loaded.stretches, start=1):
-        known, rows = rows, _plan_effects(simulation, number, shares)[1]
+        known, rows = rows, _planned_effects_and_rows(simulation, number, shares)[1]
         title = f"From {float(stretch.from_s):g} s on, otherwise than before"
         if new := [row for row in rows if row not in known]:
             print_table(console, title, headings, new, group=0)
@@ -205,14 +205,14 @@ def explain_scene(
             console.print(f"{title}: nothing")
     if outside := [item for item in planned if not item.effect.neutral and not item.built]:
         console.print()
-        console.print(_table_of_unproven(outside))
+        console.print(_table_of_omitted_effects(outside))
 
 
-def _plan_effects(
+def _planned_effects_and_rows(
     simulation: Simulation, stretch: int, shares: Mapping[tuple[str, str], float] | None
 ) -> tuple[list[Planned], list[tuple[str, str, str, str]]]:
-    """Return the effects in one stretch of the scene between its changes, built ones first, and the
-    same as table rows with bounds, share of run time and reason.
+    """Return the effects in force between two timed changes of the scene (part number `stretch`),
+    built ones first, and a table row of four texts for each.
     """
     planned = [*simulation.plans[stretch], *simulation.timing_plan_of(stretch)]
     planned.sort(key=lambda item: not item.built)
@@ -226,7 +226,7 @@ def _plan_effects(
     return planned, rows
 
 
-def _table_of_unproven(items: list[Planned]) -> Any:
+def _table_of_omitted_effects(items: list[Planned]) -> Any:
     """Return a table of the effects that --simulate-everything leaves out, and why."""
     from rich.table import Table
 

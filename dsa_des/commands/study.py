@@ -18,15 +18,15 @@ from dsa_des.results.rows import StoredRows
 from dsa_des.results.tables import DIFFERENCES, RATIOS, REQUIREMENTS, SUMMARY, Tables
 from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import parse_assignment
-from dsa_des.studies.executors import default_workers, make_executor
+from dsa_des.studies.executors import make_executor, usable_processor_count
 from dsa_des.studies.runner import (
     Clock,
     Progress,
     Stopped,
-    draw_run,
+    rerun_and_draw_replica,
+    result_tables_of_study,
     run_study,
     study_lock_step_refusal,
-    tables_of,
 )
 from dsa_des.studies.study import Study, portable_command_line
 from dsa_des.studies.study_digest import study_json_text
@@ -76,7 +76,7 @@ def study_command(
         described, target, workers, resume, resume_command, executor, scheduler
     )
     try:
-        tables = report_finished_study(
+        tables = write_and_print_finished_study(
             described, folder, quiet=quiet or as_json, draw=not no_figures, as_json=as_json
         )
         if measure:
@@ -103,7 +103,7 @@ def options_as_sets(swaps: Sequence[str], seed: int | None, replicas: int | None
 
 def show_command(folder: str, no_figures: bool, as_json: bool) -> None:
     """Print the tables of a study's folder."""
-    show_study(Path(folder), draw=not no_figures, as_json=as_json)
+    print_and_redraw_study(Path(folder), draw=not no_figures, as_json=as_json)
 
 
 def require_empty_or_resumed(
@@ -141,7 +141,7 @@ def _resume_command(
     scheduler: str | None,
     measure: bool,
 ) -> str:
-    """Return what continues a study, fit to be pasted into a shell."""
+    """Return the shell command that continues a study."""
     words = ["dsa-des", "study", "--resume", "--out", str(path)]
     for assignment in sets:
         words += ["--set", assignment]
@@ -200,13 +200,13 @@ def run_study_into_folder(
     the command that continues there.
     """
     check_workers(workers)
-    executor = make_executor(kind, workers or default_workers(), scheduler)
+    executor = make_executor(kind, workers or usable_processor_count(), scheduler)
     folder: StudyFolder | None = None
     try:
         folder = StudyFolder(path if isinstance(path, Path) else path())
         folder.open(study_json_text(study), resume=resume)
         with _show_progress(study) as report:
-            _refuse_all_failed(study, folder, run_study(study, folder, executor, report))
+            _raise_if_all_runs_failed(study, folder, run_study(study, folder, executor, report))
     except Stopped as stop:
         assert folder is not None
         code = 130 if str(stop) == "interrupted" else 1
@@ -225,7 +225,7 @@ def run_study_into_folder(
     return folder
 
 
-def _refuse_all_failed(study: Study, folder: StudyFolder, progress: Progress) -> None:
+def _raise_if_all_runs_failed(study: Study, folder: StudyFolder, progress: Progress) -> None:
     """Raise UsageError with the first run's error if every run of a study failed."""
     if 0 < progress.failed == progress.runs and not progress.crashed:
         why = shorten(str(StoredRows(folder).failed[0]["error"]), _LONGEST_ERROR)
@@ -235,7 +235,7 @@ def _refuse_all_failed(study: Study, folder: StudyFolder, progress: Progress) ->
         )
 
 
-def report_finished_study(
+def write_and_print_finished_study(
     study: "Study | StudyRecord", folder: StudyFolder, *, quiet: bool = False,
     only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
     draw: bool = True, as_json: bool = False,
@@ -247,7 +247,10 @@ def report_finished_study(
     JSON and nothing else.
     """
     if isinstance(study, Study):
-        tables, again = tables_of(study, folder), partial(draw_run, study, folder)
+        tables, again = (
+            result_tables_of_study(study, folder),
+            partial(rerun_and_draw_replica, study, folder),
+        )
     else:  # nothing of the folder's is imported, so nothing is run
         tables, again = Tables(study, folder), None
     try:
@@ -270,7 +273,7 @@ def report_finished_study(
 
 
 def _tables_as_json(tables: Tables, figures: Sequence[Path]) -> dict[str, Any]:
-    """Return the tables that a study's folder holds as rows, and where it is."""
+    """Return a study's tables as lists of rows, run counts, and paths of folder and figures."""
     rows = {
         name.removesuffix(".parquet"): [] if table is None else table.to_pylist()
         for name in (SUMMARY, DIFFERENCES, RATIOS, REQUIREMENTS)
@@ -291,7 +294,7 @@ def _count_crashed_runs(tables: Tables) -> int:
     return len(tables.rows.places) + tables.rows.failed
 
 
-def show_study(
+def print_and_redraw_study(
     path: Path, only: Sequence[str] = (), first: "Callable[[Tables], None]" = lambda tables: None,
     draw: bool = True, as_json: bool = False,
 ) -> None:  # fmt: skip
@@ -301,7 +304,7 @@ def show_study(
     """
     folder = StudyFolder(path)
     every = summarised_result_names(folder.record.results, only)
-    report_finished_study(
+    write_and_print_finished_study(
         folder.record, folder, only=only or every, first=first, draw=draw, as_json=as_json
     )
 
@@ -355,11 +358,11 @@ def _show_progress(study: Study) -> Iterator[Any]:
     """Yield a function that shows progress: a bar on a terminal, else a line every 10 s at most."""
     clock = Clock()
     if sys.stderr.isatty():
-        with terminal.progress("text") as bar:
+        with terminal.progress_bar("text") as bar:
             task = bar.add_task(shorten(study.title), total=None, text="")
 
             def update(progress: Any) -> None:
-                text = clock.text(progress)
+                text = clock.progress_text(progress)
                 bar.update(task, total=progress.total, completed=progress.runs, text=text)
 
             yield update
@@ -370,7 +373,7 @@ def _show_progress(study: Study) -> Iterator[Any]:
 
     def note(progress: Any) -> None:
         nonlocal last
-        text = clock.text(progress)
+        text = clock.progress_text(progress)
         if time.monotonic() - last > 10:
             last = time.monotonic()
             say(text, err=True)

@@ -13,7 +13,7 @@ from dsa_des.results.labels import short_text, unit_of
 from dsa_des.results.record import EVENT, Result
 from dsa_des.results.tables import Tables
 from dsa_des.terminal.terminal import console, say
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 #: Combinations of axis values that are listed, and results that a line names.
 _MOST_PLACES, _MOST_NAMED = 12, 8
@@ -64,7 +64,7 @@ class _Change:
     def has_change(self) -> bool:
         return bool(self.fell or self.rose or self.gone or self.come)
 
-    def clauses(self) -> list[str]:
+    def phrases_on_change(self) -> list[str]:
         """Return phrases on how many runs fell and rose, in the result's words, and mean change."""
         of, told = f" of {self.pairs} runs", self.result.told
         assert told is not None
@@ -107,7 +107,8 @@ def print_changes(
             indent = "    "
         for line in _change_lines(changes):
             for part in textwrap.wrap(
-                printable(line), width, initial_indent=indent, subsequent_indent=f"{indent}  ",
+                escape_unprintable(line), width, initial_indent=indent,
+                subsequent_indent=f"{indent}  ",
                 break_long_words=False, break_on_hyphens=False,
             ):  # fmt: skip
                 say(part)
@@ -122,7 +123,7 @@ def _change_lines(changes: Sequence[_Change]) -> list[str]:
     clauses: dict[str, list[str]] = {}
     for change in changes:
         if change.result.told is not None:
-            clauses.setdefault(change.result.told.who, []).extend(change.clauses())
+            clauses.setdefault(change.result.told.who, []).extend(change.phrases_on_change())
     lines = [f"{shorten(who)}: {'; '.join(said)}" for who, said in clauses.items() if said]
     same = [shorten(who) for who, said in clauses.items() if not said]
     if same:

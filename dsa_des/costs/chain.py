@@ -13,7 +13,7 @@ from typing import Any
 
 from dsa_des.block.ladder import Unavailable
 from dsa_des.block.mark import RED
-from dsa_des.costs.climb import Comparison, RungCost, is_on_front
+from dsa_des.costs.climb import Comparison, RungCost, flag_points_on_front
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.drawing import draw_to_png, figure_text, set_plain_log_ticks
@@ -51,13 +51,13 @@ def run_rung_combinations(
     combinations = list(itertools.product(*chosen))
     best = [next(c for c in group if c.rung == c.reference) for group in groups]
     reference_scene = variants.with_rungs(_choices_of_rungs(best))
-    reference = _recorded_tables_of_run(reference_scene)
+    reference = _run_and_return_tables(reference_scene)
     rows: list[dict[str, Any]] = []
     scenes: list[Scene] = []
     for combination in combinations:
         try:
             scene = variants.with_rungs(_choices_of_rungs(combination))
-            effect = comparison(reference, _recorded_tables_of_run(scene))
+            effect = comparison(reference, _run_and_return_tables(scene))
         except (Unavailable, SceneError, BlockFailure):
             continue
         scenes.append(scene)
@@ -66,7 +66,7 @@ def run_rung_combinations(
     for row, cpu_s, scene in zip(rows, times, scenes, strict=True):
         row["cpu_us_per_target_scan"] = 1e6 * cpu_s / max(_count_target_scans(scene), 1)
     points = [(row["cpu_us_per_target_scan"], row["error_p95"]) for row in rows]
-    for row, front in zip(rows, is_on_front(points), strict=True):
+    for row, front in zip(rows, flag_points_on_front(points), strict=True):
         row["pareto"] = front
     picked = (
         f"whole chain: {len(rows)} combinations of the rungs on their own ladder's front and the "
@@ -105,7 +105,7 @@ def _choices_of_rungs(combination: Sequence[RungCost]) -> list[Choice]:
     return [Choice(c.block, c.ladder, c.ladder.rung(c.rung)) for c in combination]
 
 
-def _recorded_tables_of_run(scene: Scene) -> dict[str, Any]:
+def _run_and_return_tables(scene: Scene) -> dict[str, Any]:
     sink = MemorySink()
     Simulation(scene, recorder=Recorder([sink])).run()
     return sink.tables()
@@ -129,7 +129,7 @@ def _count_target_scans(scene: Scene) -> int:
     scans = 0
     for node in simulation.nodes.values():
         if node.clock is not None:
-            scans += len(node.clock.between(0, simulation.end_tick)[0])
+            scans += len(node.clock.scans_between(0, simulation.end_tick)[0])
     return scans * width
 
 
@@ -149,8 +149,12 @@ def _chain_row(
     }
 
 
-def draw_chain(path: Path, title: str, rows: Sequence[dict[str, Any]], label: str) -> None:
-    """Draw how much runs differ, named by `label`, against the cost of the whole chain."""
+def draw_run_error_against_cost(
+    path: Path, title: str, rows: Sequence[dict[str, Any]], label: str
+) -> None:
+    """Draw each combination of rungs by its CPU time and its run's error (axis text `label`); those
+    on the Pareto front are numbered.
+    """
     best = sorted(
         (row for row in rows if row["pareto"]), key=lambda row: row["cpu_us_per_target_scan"]
     )

@@ -11,12 +11,12 @@ from dsa_des.costs.replay import (
     RungRun,
     Spread,
     Values,
-    errors_against,
+    error_spread_by_quantity,
     errors_against_precise,
-    median_and_spread,
+    median_and_half_iqr,
     replay_values,
     run_rung,
-    time_interleaved,
+    time_rungs_in_turn,
 )
 from dsa_des.costs.variants import Choice, Variants
 from dsa_des.errors import BlockFailure, SceneError, UsageError, did_you_mean
@@ -26,7 +26,7 @@ from dsa_des.running.simulation import Simulation
 _BUDGET = re.compile(r"\s*([0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S+)\s*")
 
 
-def is_on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
+def flag_points_on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
     """Return which (cost, error) points are on the Pareto front: no other dominates them.
 
     A NaN error is on no front.
@@ -40,7 +40,7 @@ def is_on_front(points: Sequence[tuple[float, float]]) -> list[bool]:
     ]
 
 
-def parse_budgets(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, float]:
+def allowed_errors_by_unit(texts: Iterable[str], ladders: Iterable[Ladder]) -> dict[str, float]:
     """Return largest allowed errors by unit from texts such as ``0.5mrad``."""
     units = sorted({q.unit for ladder in ladders for q in ladder.quantities})
     budgets: dict[str, float] = {}
@@ -243,7 +243,7 @@ def measure_rungs(
         except Unavailable as error:
             runs.pop(rung.name, None)
             cost.unavailable = str(error)
-    time_interleaved(list(runs.values()), repeats)
+    time_rungs_in_turn(list(runs.values()), repeats)
     known: dict[str, Values] = {}
     for key, baseline in baselines.items():
         known[key] = replay_values(ladder, baseline, baseline)
@@ -252,9 +252,9 @@ def measure_rungs(
         if cost.unavailable:
             continue
         run = runs[rung.name]
-        cost.in_scene = _is_same_block(run, variants, block)
+        cost.in_scene = _has_block_as_in_scene(run, variants, block)
         scale = 1e6 / max(run.instant_count() * targets, 1)
-        median, spread = median_and_spread(run.repeats_s)
+        median, spread = median_and_half_iqr(run.repeats_s)
         cost.cpu_us_per_target_scan, cost.cpu_spread_us = median * scale, spread * scale
         cost.repeats = len(run.repeats_s)
         if rung.name == reference:
@@ -262,7 +262,9 @@ def measure_rungs(
         else:
             key = str(sorted(rung.shared.items())) if rung.shared else ""
             baseline = baselines[key]
-            cost.errors = errors_against(ladder, replay_values(ladder, run, baseline), known[key])
+            cost.errors = error_spread_by_quantity(
+                ladder, replay_values(ladder, run, baseline), known[key]
+            )
             if compare is not None:
                 cost.effect = compare(baseline.tables, run.tables)
     _mark_front_and_budgets(costs, budgets or {}, variants.tolerance)
@@ -297,7 +299,7 @@ def _count_targets(values: Values, ladder: Ladder) -> int:
     return int(values[1][ladder.quantities[0].name].shape[1])
 
 
-def _is_same_block(run: RungRun, variants: Variants, block: str) -> bool:
+def _has_block_as_in_scene(run: RungRun, variants: Variants, block: str) -> bool:
     mine, scenes = run.scene.blocks[block], variants.scene.blocks[block]
     return (
         mine.cls is scenes.cls
@@ -306,7 +308,7 @@ def _is_same_block(run: RungRun, variants: Variants, block: str) -> bool:
     )
 
 
-def _equalise_ties(costs: list[RungCost]) -> None:
+def _equalise_tied_costs(costs: list[RungCost]) -> None:
     """Set the CPU costs of rungs within 10 % of each other to their mean; note which are tied."""
     ordered = sorted(costs, key=lambda cost: cost.cpu_us_per_target_scan)
     groups: list[list[RungCost]] = []
@@ -326,7 +328,7 @@ def _mark_front_and_budgets(
     costs: list[RungCost], budgets: Mapping[str, float], tolerance: Mapping[str, float]
 ) -> None:
     known = [cost for cost in costs if not cost.unavailable]
-    _equalise_ties(known)
+    _equalise_tied_costs(known)
     # A reference whose own error is unknown is on the front: nothing is known to beat it.
     points = [
         (
@@ -335,7 +337,7 @@ def _mark_front_and_budgets(
         )
         for c in known
     ]
-    for cost, front in zip(known, is_on_front(points), strict=True):
+    for cost, front in zip(known, flag_points_on_front(points), strict=True):
         cost.pareto = front
         limits = {
             quantity.name: limit

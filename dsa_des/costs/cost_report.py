@@ -19,12 +19,12 @@ from dsa_des.text.safe_text import shorten
 _NO_ERROR = "-"
 
 
-def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+def write_rows_as_parquet(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     """Write rows as Parquet; nested tables become columns with a prefix, lists become text."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    flat = [_flatten(row) for row in rows]
+    flat = [_flatten_nested_columns(row) for row in rows]
     names = list(dict.fromkeys(name for row in flat for name in row))
     # To memory first: a Parquet writer on a full disk fails a second time when it is collected.
     content = io.BytesIO()
@@ -32,11 +32,11 @@ def write_table(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     write_file(path, content.getvalue())
 
 
-def _flatten(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+def _flatten_nested_columns(row: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for name, value in row.items():
         if isinstance(value, Mapping):
-            flat.update(_flatten(value, f"{prefix}{name}_"))
+            flat.update(_flatten_nested_columns(value, f"{prefix}{name}_"))
         else:
             flat[f"{prefix}{name}"] = ", ".join(value) if isinstance(value, list) else value
     return flat
@@ -81,8 +81,9 @@ def _cost_cells(cost: RungCost, comparison: Comparison) -> list[str]:
     effects = [format_change_value(change, cost.effect, _NO_ERROR) for change in comparison.changes]
     return [
         name,
-        f"{_round_plainly(cost.cpu_us_per_target_scan)} ± {_round_plainly(cost.cpu_spread_us, 1)}",
-        *(_NO_ERROR if math.isnan(error) else _round_plainly(error) for error in errors),
+        f"{_rounded_number_text(cost.cpu_us_per_target_scan)} ± "
+        f"{_rounded_number_text(cost.cpu_spread_us, 1)}",
+        *(_NO_ERROR if math.isnan(error) else _rounded_number_text(error) for error in errors),
         *effects,
         "; ".join(_cost_notes(cost) + comparison.describe_changes(cost.effect)),
     ]
@@ -105,7 +106,7 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
     headings = ["us/target-scan", comparison.difference.name, *(c.heading for c in telling)]
     rows = [
         [
-            _round_plainly(row["cpu_us_per_target_scan"]),
+            _rounded_number_text(row["cpu_us_per_target_scan"]),
             f"{row['error_p95']:.2%}",
             *(format_change_value(change, row["effect"], _NO_ERROR) for change in telling),
             row["rung"],
@@ -118,13 +119,13 @@ def _print_chain(console: Any, chain: Sequence[Mapping[str, Any]], comparison: C
     print_table(console, title, [*headings, "rungs"], rows, below=last, right=range(last))
 
 
-def _round_plainly(value: float, digits: int = 3) -> str:
+def _rounded_number_text(value: float, digits: int = 3) -> str:
     """Return a number rounded to so many digits; a large one without a power of ten."""
     text = f"{value:.{digits}g}"
     return f"{float(text):,.0f}" if float(text) >= 10**digits else text
 
 
-def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
+def draw_error_against_cost(path: Path, title: str, costs: Sequence[RungCost]) -> None:
     """Draw error against cost, one panel per ladder, the front as a line and rungs by name."""
     panels = [
         [cost for cost in group if not cost.unavailable]
@@ -143,7 +144,7 @@ def draw_costs(path: Path, title: str, costs: Sequence[RungCost]) -> None:
             drawn.append((axes, _draw_panel(axes, rungs)))
         fit_axes_to_texts(figure)
         for axes, labels in drawn:  # where points are is known only now
-            put_labels(axes, labels)
+            place_labels_without_overlap(axes, labels)
 
 
 #: So many letters of the figure's title stand above one panel.
@@ -206,7 +207,7 @@ def _error_text(error: float) -> str:
     return f"{error:.0e}" if error else "0"
 
 
-def put_labels(axes: Any, labels: Sequence[Label]) -> None:
+def place_labels_without_overlap(axes: Any, labels: Sequence[Label]) -> None:
     """Write each label beside its point, moved until it covers no point and no other label."""
     high, wide, gap, mark = 12.0, 6.4, 5.0, 5.0  # a line, a letter, a gap, half a point; pixels
     places = []

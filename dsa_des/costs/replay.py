@@ -85,7 +85,7 @@ class RungRun:
 
     @property
     def repeats_s(self) -> list[float]:
-        """Processor time of each repeat, s: its shortest pass, or, if slow, every pass."""
+        """Processor time of each repeat, s: the shortest of its passes; of few passes every one."""
         if len(self.passes_s) < 2 * _PASSES:
             return self.passes_s
         return [
@@ -138,7 +138,7 @@ class _WatchedBlock:
         return result
 
 
-def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
+def time_rungs_in_turn(runs: Sequence[RungRun], repeats: int) -> None:
     """Time all rungs in turn, again and again, so that a noisy machine hurts all of them alike.
 
     With no `repeats` nothing is timed. Every round starts with another rung. Their runs went
@@ -156,7 +156,7 @@ def time_interleaved(runs: Sequence[RungRun], repeats: int) -> None:
                 run.passes_s.append(run.time_one_pass_s())
 
 
-def median_and_spread(repeats_s: Sequence[float]) -> tuple[float, float]:
+def median_and_half_iqr(repeats_s: Sequence[float]) -> tuple[float, float]:
     """Return the median and half the distance between the quartiles; NaN of nothing."""
     if not repeats_s:
         return math.nan, math.nan
@@ -203,8 +203,10 @@ def replay_values(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
     return ticks, {name: np.concatenate([values[name] for _, values in parts]) for name in names}
 
 
-def errors_against(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:
-    """Return the spread of each quantity's error at the ticks that both have."""
+def error_spread_by_quantity(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:
+    """Return each quantity's error between two evaluations at the ticks of both: mean, 95th
+    percentile, maximum and number.
+    """
     ticks, values = rung
     other_ticks, others = reference
     _, here, there = np.intersect1d(ticks, other_ticks, return_indices=True)

@@ -61,7 +61,7 @@ class Variants:
         """
         scene_file = self._file.copy()
         for choice in choices:
-            self._apply(scene_file, choice)
+            self._apply_choice(scene_file, choice)
         for choice in shared:
             _set_parameters(scene_file, choice.block, choice.rung.shared)
         try:
@@ -71,7 +71,7 @@ class Variants:
                 "; ".join(_short_problem_text(problem) for problem in error.problems)
             ) from error
 
-    def _apply(self, scene_file: SceneFile, choice: Choice) -> None:
+    def _apply_choice(self, scene_file: SceneFile, choice: Choice) -> None:
         block = scene_file.data["blocks"][choice.block]
         for key in choice.ladder.clears:
             block.pop(key, None)

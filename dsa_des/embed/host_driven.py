@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from networkx import ancestors
 
-from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
+from dsa_des.arrays.run_ticks import RunTicks, shared_zero_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Input, may_end_its_run
 from dsa_des.block.entry_points import entry_points_of
@@ -97,11 +97,11 @@ class _Wire:
         else:
             self._waiting.append((tick, message))
 
-    def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
+    def held_rows_at_instants(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
         """Return the last message and the index of its last row; None if none has arrived."""
         return None if self._last is None else (self._last, _index_of_last_row(self._last))
 
-    def collect(self, end: int) -> tuple[RunTicks, Message] | None:
+    def pop_arrived_rows(self, end: int) -> tuple[RunTicks, Message] | None:
         """Empty the queue; return its messages as one, with arrival instants; None if empty."""
         if not self._waiting:
             return None
@@ -282,7 +282,7 @@ class HostDriven:
         """
         sent, scans, tick = step.sent, step.scans, step.tick
         sent[self._source_key] = message
-        now = RunTicks(single_run_numbers(1), np.array([tick], dtype=np.int64))
+        now = RunTicks(shared_zero_run_numbers(1), np.array([tick], dtype=np.int64))
         for runner in self._runners:
             triggered = False
             for wire in runner.wires:

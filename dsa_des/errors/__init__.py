@@ -13,7 +13,7 @@ from dsa_des.errors.problems import (
     UsageError,
     did_you_mean,
     nearest_name,
-    shown_value,
+    shortened_repr,
 )
 
 __all__ = [
@@ -29,5 +29,5 @@ __all__ = [
     "UsageError",
     "did_you_mean",
     "nearest_name",
-    "shown_value",
+    "shortened_repr",
 ]

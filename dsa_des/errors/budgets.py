@@ -23,7 +23,7 @@ _SIZES = ((1e12, "TB"), (1e9, "GB"), (1e6, "MB"), (0.0, "kB"))
 
 
 def describe_long_work(asked: str, many: int, seconds_each: float, bytes_each: float) -> str:
-    """Return a sentence on how long work takes and how much it writes; empty if it is short.
+    """Return a sentence on work's time and bytes, empty if little; UsageError if too much.
 
     Parameters
     ----------

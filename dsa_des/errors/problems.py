@@ -10,7 +10,7 @@ from datetime import date, time
 from difflib import get_close_matches
 from typing import Any
 
-from dsa_des.text.safe_text import MOST_OF_A_VALUE, printable, shorten
+from dsa_des.text.safe_text import MOST_OF_A_VALUE, escape_unprintable, shorten
 
 #: Problems that are listed in one error; the others are only counted.
 MOST_PROBLEMS = 20
@@ -76,10 +76,10 @@ class Lines(str):
     @classmethod
     def from_lines(cls, lines: Iterable[object]) -> "Lines":
         """Return the lines, made printable, as one text of several lines."""
-        return cls("\n".join(printable(line) for line in lines))
+        return cls("\n".join(escape_unprintable(line) for line in lines))
 
 
-def shown_value(value: Any) -> str:
+def shortened_repr(value: Any) -> str:
     """Return how a value is shown in a message: as Python writes it, cut off where it is long.
 
     Dates and times, which only TOML has, are shown as TOML writes them.
@@ -94,9 +94,9 @@ def shown_value(value: Any) -> str:
         text = left
         for item in value:
             text += ", " if len(text) > 1 else ""
-            text += shown_value(item)
+            text += shortened_repr(item)
             if isinstance(value, dict):
-                text += f": {shown_value(value[item])}"
+                text += f": {shortened_repr(value[item])}"
             if len(text) > MOST_OF_A_VALUE:
                 return shorten(text, MOST_OF_A_VALUE)
         text += "," if isinstance(value, tuple) and len(value) == 1 else ""
@@ -134,7 +134,7 @@ class Problem:
         where = shorten(self.source, _LINE_LENGTH)
         where += f": {shorten(self.key, _KEY_LENGTH)}" if self.key else ""
         if self.value is not _UNSET:
-            where += f" = {shown_value(self.value)}"
+            where += f" = {shortened_repr(self.value)}"
         # On one line whatever stands in a name: a name cannot imitate a message of ours.
         lines = self.message.split("\n") if isinstance(self.message, Lines) else [self.message]
         return f"{where}: " + "\n".join(shorten(line, _LINE_LENGTH) for line in lines[:_MOST_LINES])
@@ -167,7 +167,7 @@ class UsageError(Exception):
     """
 
     def __str__(self) -> str:
-        return "\n".join(printable(line) for line in self.args)
+        return "\n".join(escape_unprintable(line) for line in self.args)
 
 
 class BlockFailure(Exception):
@@ -193,7 +193,7 @@ class BlockFailure(Exception):
 
     def __str__(self) -> str:
         scan = "" if self.scan is None else f", scan {self.scan}"
-        return printable(
+        return escape_unprintable(
             f"{self.block} ({self.path}) failed at t = {self.time_s:.3f} s{scan}: {self.reason}"
         )
 

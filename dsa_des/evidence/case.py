@@ -21,9 +21,9 @@ from dsa_des.scene.parameter_errors import explain_validation_error
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.studies.study import Study, format_set_value
-from dsa_des.studies.study_digest import results_of
+from dsa_des.studies.study_digest import result_columns_of_study
 from dsa_des.studies.study_file import read_study
-from dsa_des.text.run_commands import format_value
+from dsa_des.text.run_commands import format_set_option_value
 
 #: The name of the study of the system itself, and of the one that changes a parameter at a time.
 ASSESSED, SENSITIVITY = "assessed", "sensitivity"
@@ -183,7 +183,7 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
     """
     file = read_scene_file(path)
     apply_sets(file, sets)
-    file.refuse()
+    file.raise_if_problems()
     for key, takes_it in (("blocks", "run"), ("axes", "study")):
         if key in file.data and "requirements" not in file.data:
             raise SceneError(
@@ -205,20 +205,22 @@ def read_case(path: Path, sets: Iterable[str] = (), replicas: int | None = None)
             raise SceneError([file.problem(("beside", index, "name"), "is given twice", one.name)])
         many = one.replicas or replicas
         changed = [f"replicas={many}"] if many else []
-        changed += _sets_of_system(tables) if one.of_system else []
+        changed += _study_set_texts(tables) if one.of_system else []
         studies[one.name] = read_study(one.study, sets=changed)
     varied: tuple[tuple[SensitivityKey, Any, str], ...] = ()
     if tables.sensitivity:
-        varied, studies[SENSITIVITY] = _sensitivity_study(file, tables, studies[ASSESSED])
-    results = {name: {r.name: r for r in results_of(study)} for name, study in studies.items()}
+        varied, studies[SENSITIVITY] = _single_changes_and_study(file, tables, studies[ASSESSED])
+    results = {
+        name: {r.name: r for r in result_columns_of_study(study)} for name, study in studies.items()
+    }
     case = EvidenceCase(file, tables, studies, results, varied)
     _check_results(case)
     _check_sources(case)
-    file.refuse()
+    file.raise_if_problems()
     return case
 
 
-def _sets_of_system(tables: CaseTables) -> list[str]:
+def _study_set_texts(tables: CaseTables) -> list[str]:
     return [
         f"set.{key}={format_set_value(value)}" for key, value in flatten_tables(tables.set).items()
     ]
@@ -226,14 +228,14 @@ def _sets_of_system(tables: CaseTables) -> list[str]:
 
 def _load_system_study(file: SceneFile, tables: CaseTables, replicas: int | None) -> Study:
     sets = [f"replicas={replicas}"] if replicas else []
-    study = read_study(tables.study, sets=[*sets, *_sets_of_system(tables)])
+    study = read_study(tables.study, sets=[*sets, *_study_set_texts(tables)])
     if len(study.cells) != 1:
         message = f"has {len(study.cells)} cells; a case is one: a study without axes"
         raise SceneError([file.problem(("study",), message, str(file.data["study"]))])
     return study
 
 
-def _sensitivity_study(
+def _single_changes_and_study(
     file: SceneFile, tables: CaseTables, assessed: Study
 ) -> tuple[tuple[tuple[SensitivityKey, Any, str], ...], Study]:
     """Return (parameter, value, label) of all single changes, and a study with these as axis."""
@@ -265,16 +267,20 @@ def _sensitivity_study(
         "replicas": min(tables.sensitivity_replicas, assessed.replicas),
         "figures": [], "requirements": [],
     }  # fmt: skip
-    return varied, read_study(tables.study, sets=_sets_of_system(tables), keys=keys)
+    return varied, read_study(tables.study, sets=_study_set_texts(tables), keys=keys)
 
 
 def format_case_value(value: Any) -> str:
     """Return a value as text in the form in which a scene file writes it."""
-    return format_set_value(value) if isinstance(value, list | dict) else format_value(value)
+    return (
+        format_set_value(value)
+        if isinstance(value, list | dict)
+        else format_set_option_value(value)
+    )
 
 
 def _check_results(case: EvidenceCase) -> None:
-    """Report results that the case names but its study lacks, and limits that are impossible."""
+    """Note as problems of the case: results its studies lack, and limits no value can reach."""
     named = [
         (("requirements", index), one.study, one.result)
         for index, one in enumerate(case.tables.requirements)
@@ -299,7 +305,7 @@ def _check_results(case: EvidenceCase) -> None:
 
 
 def _check_limit(case: EvidenceCase, at: tuple[str, int], study: str, result: str) -> None:
-    """Report a requirement's limit outside the range of values that its result can have."""
+    """Note a problem of the case if a requirement's limit is no possible value of its result."""
     asked = case.tables.requirements[at[1]]
     low, high = case.results[study][result].bounds
     if low <= asked.limit <= high:
@@ -311,7 +317,7 @@ def _check_limit(case: EvidenceCase, at: tuple[str, int], study: str, result: st
 
 
 def _check_sources(case: EvidenceCase) -> None:
-    """Report every block whose scene states a value that no source covers."""
+    """Note a problem for every block with values in the scene whose source is not stated."""
     sources, scene = case.tables.sources, case.system_study.scene(0)
     for key in flatten_tables(sources):
         parts = key.removeprefix("blocks.").split(".")
@@ -321,13 +327,15 @@ def _check_sources(case: EvidenceCase) -> None:
             case.file.report(("sources", key), message)
     for name, block in scene.blocks.items():
         stated = block.parameters.model_fields_set
-        missing = [key for key in sorted(stated) if source_of(sources, name, key) is None]
+        missing = [
+            key for key in sorted(stated) if stated_source_of_parameter(sources, name, key) is None
+        ]
         if missing:
             message = (
                 f"is missing: nobody says where {', '.join(missing)} of block {name!r} come from"
             )
             case.file.report(("sources", name), message)
-    if wires_with_options(scene) and source_of(sources, WIRES, "") is None:
+    if wires_with_options(scene) and stated_source_of_parameter(sources, WIRES, "") is None:
         message = "is missing: nobody says where delays and losses of wires come from"
         case.file.report(("sources", WIRES), message)
 
@@ -338,7 +346,7 @@ def wires_with_options(scene: Scene) -> list[dict[str, Any]]:
     return [dict(wire) for wire in whole if set(wire) - {"from", "to", "holds"}]
 
 
-def source_of(sources: Mapping[str, Any], block: str, key: str) -> str | None:
+def stated_source_of_parameter(sources: Mapping[str, Any], block: str, key: str) -> str | None:
     """Return a parameter's stated source: its key's, else its block's; None if there is neither."""
     known = {
         name.removeprefix("blocks."): str(text) for name, text in flatten_tables(sources).items()

@@ -99,8 +99,8 @@ def convergence_of(
 ) -> Convergence:
     """Return a result's estimates for growing replica numbers, and how far the last ones moved."""
     rule, rows, record = case.tables.convergence, tables.rows, tables.record
-    ((_, chosen),) = list(rows.each_place())
-    counts, start = counts_of_running_estimate(len(chosen), rule.over_last)
+    ((_, chosen),) = list(rows.row_indices_by_axis_values())
+    counts, start = unit_counts_and_settling_start(len(chosen), rule.over_last)
 
     def estimate(many: int) -> Estimate:
         some: IntArray = chosen[:many]
@@ -115,8 +115,9 @@ def convergence_of(
     return Convergence(counts, estimates, start, moved, rule.share * whole)
 
 
-def counts_of_running_estimate(units: int, over_last: float) -> tuple[list[int], int]:
-    """Return ascending unit numbers for running estimates, and from which these must settle.
+def unit_counts_and_settling_start(units: int, over_last: float) -> tuple[list[int], int]:
+    """Return ascending counts of units to estimate from, and the count from which estimates must
+    stay settled.
 
     The way there is spaced evenly in the logarithm, the last stretch evenly.
     """

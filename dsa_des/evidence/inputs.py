@@ -13,12 +13,12 @@ from dsa_des.evidence.case import (
     WIRES,
     EvidenceCase,
     format_case_value,
-    source_of,
+    stated_source_of_parameter,
     wires_with_options,
 )
 from dsa_des.results.folder import StudyFolder
 from dsa_des.scene.scene_file import COMMAND_LINE, read_scene_file
-from dsa_des.studies.draws import file_digest
+from dsa_des.studies.draws import file_sha256
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_digest import study_input_files
 
@@ -46,9 +46,9 @@ class CaseFiles:
             return self.names[path]
         return path.name if os.path.isabs(text) else text
 
-    def digests(self) -> list[dict[str, str]]:
+    def file_names_and_sha256(self) -> list[dict[str, str]]:
         """Return name and SHA-256 of every file of the case, sorted by name."""
-        rows = [{"file": name, "sha256": file_digest(path)} for path, name in self.names.items()]
+        rows = [{"file": name, "sha256": file_sha256(path)} for path, name in self.names.items()]
         return sorted(rows, key=lambda row: (row["file"], row["sha256"]))
 
     def contents_by_name(self) -> dict[str, bytes]:
@@ -86,7 +86,7 @@ def _existing_paths(sources: Iterable[str]) -> list[Path]:
     return [Path(os.path.abspath(source)) for source in set(sources) if source != COMMAND_LINE]
 
 
-def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
+def parameter_and_wire_records(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
     """Return a dict for every parameter of the system's blocks and for every wire with options:
     key, value, meaning, where it is written, and its stated source.
     """
@@ -100,7 +100,7 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
         for key, value in values.items():
             where = DEFAULT
             if key in block.parameters.model_fields_set:
-                where = files.relative_name(study.base.source_of(("blocks", name, key)))
+                where = files.relative_name(study.base.source_file_of(("blocks", name, key)))
             if any(f"{one}.".startswith(f"{name}.{key}.") for one in changed):
                 where = "the study or the case"
             rows.append({
@@ -111,7 +111,8 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
                 ),
                 "meaning": (fields[key].description or "") if key in fields else "",
                 "written_in": where,
-                "source": source_of(case.tables.sources, name, key) if where != DEFAULT else None,
+                "source": stated_source_of_parameter(case.tables.sources, name,
+                key) if where != DEFAULT else None,
             })  # fmt: skip
     for wire in wires_with_options(scene):
         way = f"{wire.pop('from')} -> {wire.pop('to')}"
@@ -120,13 +121,13 @@ def parameters_of(case: EvidenceCase, files: CaseFiles) -> list[dict[str, Any]]:
             "value": ", ".join(f"{key} = {format_case_value(value)}" for key,
             value in wire.items()),
             "meaning": "What the wire does to messages.",
-            "written_in": files.relative_name(study.base.source_of((WIRES,))),
-            "source": source_of(case.tables.sources, WIRES, way),
+            "written_in": files.relative_name(study.base.source_file_of((WIRES,))),
+            "source": stated_source_of_parameter(case.tables.sources, WIRES, way),
         })  # fmt: skip
     return rows
 
 
-def models_of(study: Study) -> list[dict[str, Any]]:
+def models_of_blocks(study: Study) -> list[dict[str, Any]]:
     """Return a dict per block of the first scene: name, type, description, verification."""
     return [
         {
@@ -144,7 +145,7 @@ def verifications_of_class(cls: type) -> list[Verified]:
 
 
 def digest_of_results(folder: StudyFolder) -> str:
-    """Return the SHA-256 of a study's result rows without command and error; no folder in it."""
+    """Return the SHA-256 of a study's result rows without their commands and errors."""
     import pyarrow as pa
 
     table = folder.results()

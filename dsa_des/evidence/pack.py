@@ -19,11 +19,11 @@ from dsa_des.evidence.inputs import (
     CaseFiles,
     digest_of_results,
     files_of_case,
-    models_of,
-    parameters_of,
+    models_of_blocks,
+    parameter_and_wire_records,
 )
 from dsa_des.results.folder import StudyFolder
-from dsa_des.results.models import read_explained, versions
+from dsa_des.results.models import package_versions, read_explained
 from dsa_des.results.tables import Tables
 from dsa_des.text.plain_json import json_text
 from dsa_des.text.safe_text import shell_line
@@ -73,17 +73,17 @@ class Pack:
             },
             "sensitivity": [_change_as_dict(one) for one in self.changes],
             "sensitivity_encounters": self._replica_count(SENSITIVITY),
-            "parameters": parameters_of(self.case, self.files),
-            "models": models_of(self.case.system_study),
+            "parameters": parameter_and_wire_records(self.case, self.files),
+            "models": models_of_blocks(self.case.system_study),
             "left_out": self._omissions_as_dict(),
             "seeds": {name: study.seed for name, study in self.case.studies.items()},
-            "inputs": self.files.digests(),
+            "inputs": self.files.file_names_and_sha256(),
             "results": [
                 {"study": name, "runs": len(self.tables[name].rows.places),
                  "failed": self.tables[name].rows.failed, "rows_sha256": digest_of_results(folder)}
                 for name, folder in self.folders.items()
             ],
-            "versions": versions(),
+            "versions": package_versions(),
             "command": self.command,
         }  # fmt: skip
 

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from dsa_des.evidence.inputs import DEFAULT
 from dsa_des.results.labels import readable_label, short_text
 from dsa_des.results.report import PAGE_HEAD, read_page_template, report_jinja_environment
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 _PAGE = PAGE_HEAD + read_page_template("evidence.html")
 
@@ -62,7 +62,7 @@ def evidence_html(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
         ],
         convergence=base64.b64encode(convergence).decode(),
         sensitivity=base64.b64encode(sensitivity or b"").decode(),
-        stated=_parameter_rows([p for p in e["parameters"] if p["written_in"] != DEFAULT]),
+        stated=_parameter_rows_by_block([p for p in e["parameters"] if p["written_in"] != DEFAULT]),
         defaults=[(p["key"], p["value"], p["meaning"])
                   for p in e["parameters"] if p["written_in"] == DEFAULT],
         verified=[
@@ -83,10 +83,10 @@ def evidence_html(e: Mapping[str, Any], convergence: bytes, sensitivity: bytes |
 
 def _escape_without_shortening(text: str) -> Markup:
     """Return a text escaped for HTML and not shortened, however long it is."""
-    return Markup(escape(printable(text)))
+    return Markup(escape(escape_unprintable(text)))
 
 
-def _parameter_rows(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
+def _parameter_rows_by_block(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
     """Return (block, source of most of its values, rows of its parameters) for each block; a row
     names its own source only if that differs.
     """
@@ -106,7 +106,7 @@ def _parameter_rows(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
 
 
 def _comparison_rows(e: Mapping[str, Any], names: list[str]) -> list[tuple[str, ...]]:
-    """Return a table row per result for the system and each compared study; none without such."""
+    """Return a table row per result for the system and each compared study; empty without these."""
     own = [r for r in (*e["requirements"], *e["also"]) if r.get("study") in (None, "assessed")]
     rows = [(e["system"]["name"], own)] + [(one["name"], one["results"]) for one in e["beside"]]
     if len(rows) == 1:

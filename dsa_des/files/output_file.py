@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from dsa_des.errors import UsageError
-from dsa_des.files.output_names import name_refusal, system_error_text
+from dsa_des.files.output_names import reason_name_is_unusable, system_error_text
 from dsa_des.terminal.interruption import defer_signals
 
 #: Endings of the pictures that are drawn.
@@ -56,7 +56,7 @@ def check_file_writable(path: Path, option: str = "--out") -> None:
 
     Files that a killed process has left half-written beside it are removed.
     """
-    if reason := name_refusal(path):
+    if reason := reason_name_is_unusable(path):
         raise UsageError(f"{option} {path}: {reason}")
     try:
         if not path.parent.is_dir():

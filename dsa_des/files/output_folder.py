@@ -32,7 +32,7 @@ _FILES = "files"
 _MOST_READ = 1 << 20
 
 
-def add_file_list(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
+def content_with_file_digests(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     """Return the content of ``run.json`` with a digest of every file that is in the folder now."""
     files = {
         name: _quick_digest(folder / name) for name in _file_names_below(folder) if name != RUN_JSON
@@ -40,14 +40,14 @@ def add_file_list(folder: Path, content: dict[str, Any]) -> dict[str, Any]:
     return {**content, _FILES: files}
 
 
-def foreign_files(folder: Path) -> list[str]:
+def foreign_or_changed_files(folder: Path) -> list[str]:
     """Return, sorted, a folder's files that dsa_des did not write or that changed since.
 
     All of it if the folder holds no ``run.json`` of ours; nothing if it is empty. A file that was
     changed since is not what we wrote.
     """
     names = list(_file_names_below(folder))
-    files = _read_listing(folder / RUN_JSON)
+    files = _read_file_digests(folder / RUN_JSON)
     if files is None:
         return names
     return [
@@ -57,7 +57,7 @@ def foreign_files(folder: Path) -> list[str]:
     ]
 
 
-def _read_listing(path: Path) -> dict[str, str] | None:
+def _read_file_digests(path: Path) -> dict[str, str] | None:
     try:
         if not stat.S_ISREG(path.lstat().st_mode):
             return None
@@ -114,7 +114,7 @@ class OutputFolder:
     def check(self) -> None:
         """Raise UsageError unless the results can be written to this folder."""
         check_folder_path(self.path)
-        if self._stem is None and (reason := _replace_refusal(absolute_location(self.path))):
+        if self._stem is None and (reason := _reason_not_to_replace(absolute_location(self.path))):
             raise UsageError(f"--out {self.path}: {reason}; choose a new name")
 
     @contextmanager
@@ -229,17 +229,17 @@ def _move_earlier_results(path: Path, earlier: Path) -> str | None:
         path.rename(earlier)
     except OSError as error:
         return f"cannot be replaced: {system_error_text(error)}"
-    if reason := _replace_refusal(earlier):
+    if reason := _reason_not_to_replace(earlier):
         earlier.rename(path)
     return reason
 
 
-def _replace_refusal(path: Path) -> str | None:
+def _reason_not_to_replace(path: Path) -> str | None:
     """Return why a folder (with files dsa_des did not write) must not be replaced, or None."""
     if not os.path.lexists(path):
         return None
     try:
-        foreign = foreign_files(path)
+        foreign = foreign_or_changed_files(path)
     except OSError as error:
         return f"cannot be read: {system_error_text(error)}"
     if not foreign:

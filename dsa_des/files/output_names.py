@@ -22,7 +22,7 @@ def user_path(text: str, option: str = "--out") -> Path:
     """Return a typed path with ``~`` as the home folder; UsageError if it cannot be a path."""
     if not text.strip():
         raise UsageError(f"{option} {text!r}: is empty; a name is needed")
-    if reason := name_refusal(text):
+    if reason := reason_name_is_unusable(text):
         raise UsageError(f"{option} {text!r}: {reason}")
     if not text.startswith("~"):
         return Path(text)
@@ -35,7 +35,7 @@ def user_path(text: str, option: str = "--out") -> Path:
         ) from None
 
 
-def name_refusal(path: str | Path) -> str | None:
+def reason_name_is_unusable(path: str | Path) -> str | None:
     """Return why no file can have this name, or None if one can."""
     text = os.fspath(path)
     if "\0" in text:
@@ -103,7 +103,7 @@ def check_folder_path(folder: Path, option: str = "--out") -> None:
 
     What is in a folder that is there is not looked at.
     """
-    if reason := name_refusal(folder):
+    if reason := reason_name_is_unusable(folder):
         raise UsageError(f"{option} {folder}: {reason}")
     try:
         if ".." in folder.parts:

@@ -11,7 +11,7 @@ from dsa_des.errors import UsageError
 from dsa_des.files.output_folder import OutputFolder
 from dsa_des.files.toml_files import to_toml
 from dsa_des.library.scenes import as_scene
-from dsa_des.record.drawing import keep_figures
+from dsa_des.record.drawing import collect_drawn_figures
 from dsa_des.record.recording import Recorder
 from dsa_des.record.run_folder import Run, read_run
 from dsa_des.record.sinks import MemorySink, ObserverSink
@@ -93,8 +93,10 @@ def _run_in_memory(
     )
     if noted or notes:
         info["notes"] = [*noted, *notes]
-    said = metadata_of_run(simulation.recorded_messages(), text, scene.seed, simulation.ticks_per_s)
-    arrow = said.attach(tables.tables())
+    said = metadata_of_run(
+        simulation.recorded_message_types(), text, scene.seed, simulation.ticks_per_s
+    )
+    arrow = said.tables_with_metadata(tables.tables())
     return Run(
         None,
         info,
@@ -114,7 +116,7 @@ def _figures_of_run_in_memory(
         folder = Path(path)
         for name, table in tables.items():
             pq.write_table(table, folder / f"{name}.parquet")
-        with keep_figures() as result:
+        with collect_drawn_figures() as result:
             notes = draw_all_reports(reports, simulation, folder, summary)
     if notes and not result:
         raise UsageError("; ".join(notes))

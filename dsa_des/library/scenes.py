@@ -58,7 +58,7 @@ def _read_source(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFil
         try:
             return read_scene_tables(to_scene_value(source), _TABLE)
         except TypeError as error:
-            raise SceneError([_find_unusable_value(source, str(error))]) from None
+            raise SceneError([_problem_of_unusable_value(source, str(error))]) from None
     if not isinstance(source, str | os.PathLike):
         message = "must be a path, the name of a shipped scene, or a table"
         raise SceneError([Problem("load_scene", "", message, source)])
@@ -74,7 +74,7 @@ def _read_source(source: str | os.PathLike[str] | Mapping[str, Any]) -> SceneFil
     return read_scene_file(path)
 
 
-def _find_unusable_value(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
+def _problem_of_unusable_value(tables: Mapping[str, Any], message: str, key: str = "") -> Problem:
     """Return a problem that names the first value of the tables that cannot be in a scene."""
     for name, value in tables.items():
         inner = f"{key}.{name}" if key else str(name)
@@ -82,7 +82,7 @@ def _find_unusable_value(tables: Mapping[str, Any], message: str, key: str = "")
             try:
                 to_scene_value(value)
             except TypeError:
-                return _find_unusable_value(value, message, inner)
+                return _problem_of_unusable_value(value, message, inner)
             continue
         try:
             to_scene_value(value)

@@ -13,7 +13,7 @@ from weakref import finalize
 from dsa_des.block.registry import class_texts_in
 from dsa_des.errors import OutputError, Problem, SceneError, UsageError, did_you_mean
 from dsa_des.library.scenes import as_scene
-from dsa_des.record.drawing import keep_figures, pictures_in
+from dsa_des.record.drawing import collect_drawn_figures, pictures_in
 from dsa_des.results.figures import draw_figures
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.printing import print_study_tables
@@ -22,9 +22,15 @@ from dsa_des.scene.examples import find_input_file
 from dsa_des.scene.overrides import SWAP, Change, apply_changes, to_scene_value
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
-from dsa_des.studies.executors import default_workers, make_executor
+from dsa_des.studies.executors import make_executor, usable_processor_count
 from dsa_des.studies.metric import METRICS, Metric
-from dsa_des.studies.runner import Progress, Stopped, draw_run, run_study, tables_of
+from dsa_des.studies.runner import (
+    Progress,
+    Stopped,
+    rerun_and_draw_replica,
+    result_tables_of_study,
+    run_study,
+)
 from dsa_des.studies.study import Study, changed_scene, portable_command_line
 from dsa_des.studies.study_digest import study_json_text
 from dsa_des.studies.study_file import read_study, study_of_tables
@@ -54,7 +60,7 @@ class StudyResult:
         self._study, self._folder, self._home = study, folder, home
         if home is not None:
             finalize(self, rmtree, home, ignore_errors=True)
-        self._tables = tables_of(study, folder)
+        self._tables = result_tables_of_study(study, folder)
         self._tables.write()
         if home is None:
             _ = self.figures
@@ -82,8 +88,10 @@ class StudyResult:
     @cached_property
     def figures(self) -> dict[str, Any]:
         """All figures by name."""
-        with keep_figures() as drawn:
-            draw_figures(self._tables, (), partial(draw_run, self._study, self._folder))
+        with collect_drawn_figures() as drawn:
+            draw_figures(
+                self._tables, (), partial(rerun_and_draw_replica, self._study, self._folder)
+            )
         return {**pictures_in(self._folder.path), **drawn}
 
     def figure(self, name: str) -> Any:
@@ -205,7 +213,7 @@ def study(
     for key in {"scene", "set", "swap"} & tables.keys():
         message = "is no keyword: give a scene, and change it with scene.set and scene.swap"
         raise SceneError([Problem("study", key, message)])
-    described = study_of_tables(tables, *_split_changes(*loaded.origin))
+    described = study_of_tables(tables, *_tables_swaps_and_changes(*loaded.origin))
     described.repeat = _BY_A_PROGRAM
     return _run_study(described, _default_worker_count(described, workers), out, resume, progress)
 
@@ -238,10 +246,11 @@ def _keywords_as_tables(given: Mapping[str, Any]) -> dict[str, Any]:
     return tables
 
 
-def _split_changes(
+def _tables_swaps_and_changes(
     file: SceneFile, changes: Sequence[Change]
 ) -> tuple[SceneFile, list[tuple[str, str]], list[Change]]:
-    """Return a scene's original tables, its type changes as (block, type), and other changes.
+    """Return (original scene, swaps as (block, type), other changes), or where this order would
+    differ (changed scene, [], []).
 
     Where that order would give another scene, the changed tables, and no changes.
     """
@@ -281,7 +290,7 @@ def _default_worker_count(study: Study, workers: int | None) -> int:
             f"workers is {workers}: other processes cannot import {name}, which is defined in a "
             "program, a notebook or a function; put it into a module, or take workers=1"
         )
-    return workers or default_workers()
+    return workers or usable_processor_count()
 
 
 def _run_study(

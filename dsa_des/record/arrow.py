@@ -15,8 +15,8 @@ from dsa_des.arrays.column_values import (
     Schema,
     Text,
     instants_to_seconds,
-    is_null_column,
-    null_float_column,
+    is_shared_nan_column,
+    shared_nan_column,
 )
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import slice_columns
@@ -65,18 +65,18 @@ def _arrow_array(values: Any, kind: str) -> pa.Array:
         return _dictionary_array(values.codes, values.names).cast(pa.string())
     values = instants_to_seconds(values)
     if kind == "float64":
-        if is_null_column(values):
+        if is_shared_nan_column(values):
             return pa.nulls(len(values), _TYPES[kind])
         missing = np.isnan(values)
         count = np.count_nonzero(missing)
         if count == len(values):
             return pa.nulls(count, _TYPES[kind])
-        return _array_of_buffer(values, missing if count else None)
+        return _array_with_nulls(values, missing if count else None)
     dtype = np.dtype(bool) if kind == "bool" else np.dtype(np.int64)
-    return _array_of_buffer(np.asarray(values).astype(dtype, casting="safe", copy=False))
+    return _array_with_nulls(np.asarray(values).astype(dtype, casting="safe", copy=False))
 
 
-def _array_of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Array:
+def _array_with_nulls(values: AnyArray, missing: AnyArray | None = None) -> pa.Array:
     """Return an Arrow array of the same values, null where `missing` is True.
 
     ``pa.array`` imports pandas where that is installed, a fifth of a short run's time.
@@ -90,7 +90,7 @@ def _array_of_buffer(values: AnyArray, missing: AnyArray | None = None) -> pa.Ar
 
 def _dictionary_array(codes: AnyArray, names: tuple[str, ...]) -> pa.DictionaryArray:
     missing = codes < 0
-    indices = _array_of_buffer(codes, missing if missing.any() else None)
+    indices = _array_with_nulls(codes, missing if missing.any() else None)
     encoded = [name.encode() for name in names]
     ends = np.cumsum([0, *map(len, encoded)], dtype=np.int32)
     buffers = [None, pa.py_buffer(ends), pa.py_buffer(b"".join(encoded))]
@@ -203,7 +203,7 @@ class ParquetSink:
             self._flush(table, whole=False)
             writer.close()
 
-    def release(self) -> None:
+    def close_after_failure(self) -> None:
         """Close files still open after a failure, ignoring errors; their content is lost.
 
         A writer that could not write would try again when it is collected, and complain then.
@@ -225,8 +225,8 @@ def _writer_schema(schema: Schema) -> pa.Schema:
 def _concatenate(parts: list[Any]) -> Any:
     if len(parts) == 1:
         return parts[0]
-    if all(is_null_column(part) for part in parts):
-        return null_float_column(sum(len(part) for part in parts))
+    if all(is_shared_nan_column(part) for part in parts):
+        return shared_nan_column(sum(len(part) for part in parts))
     if isinstance(parts[0], Text):
         # A recorder only ever adds names: the last piece knows them all.
         return Text(np.concatenate([part.codes for part in parts]), parts[-1].names)

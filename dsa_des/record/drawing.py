@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 from dsa_des.errors import UsageError
 from dsa_des.files.output_file import write_file
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -82,9 +82,9 @@ def _drawn_figure_class() -> Any:
 
         def save(self, path: str | os.PathLike[str]) -> None:
             """Write the figure in the format that the name asks for; see `PictureFile.save`."""
-            _save_picture(self.name, self.png, path, self._as)
+            _save_picture(self.name, self.png, path, self._bytes_in_format)
 
-        def _as(self, kind: str) -> bytes:
+        def _bytes_in_format(self, kind: str) -> bytes:
             content = io.BytesIO()
             date = {"Date": None} if kind == "svg" else {"CreationDate": None}
             with matplotlib.rc_context({"svg.hashsalt": self.name}):
@@ -98,7 +98,7 @@ _kept: ContextVar[dict[str, Any] | None] = ContextVar("kept figures", default=No
 
 
 @contextmanager
-def keep_figures() -> Iterator[dict[str, Any]]:
+def collect_drawn_figures() -> Iterator[dict[str, Any]]:
     """Collect figures drawn to files in the context: yields file stem → matplotlib figure."""
     figures: dict[str, Any] = {}
     token = _kept.set(figures)
@@ -222,4 +222,4 @@ def _shorten(text: str) -> str:
     lines = [shorten(line, _MOST_OF_A_LINE) for line in text.split("\n")]
     if len(lines) > _MOST_LINES:
         lines = [*lines[: _MOST_LINES - 1], "…"]
-    return printable("\n".join(lines), lines=True)
+    return escape_unprintable("\n".join(lines), lines=True)

@@ -22,7 +22,7 @@ SECONDS_FAILED = "seconds failed"
 _LEAST_SHARE = 0.1
 
 
-def add_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tuple[int, int]]]:
+def sum_failure_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tuple[int, int]]]:
     """Return the sum of runs' failure counts: block → what was missing → (failures, cases)."""
     result: dict[str, dict[str, tuple[int, int]]] = {}
     for part in parts:
@@ -38,8 +38,9 @@ def add_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tuple[int,
     }
 
 
-def add_cases(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
-    """Return counts (2, runs) of failures and cases, with new ones added by run number.
+def counts_with_cases_added(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
+    """Return `known`, counts (2, runs) of failures and cases, plus one per run number in `lacking`
+    (failures) and in `every` (cases).
 
     The counts may end before the last run.
     """
@@ -74,7 +75,7 @@ def sum_counts_over_runs(failures: FailuresByRun, runs: Collection[int] | slice)
             times, of = of_each[:, some].sum(axis=1).tolist()
             if of:
                 result.setdefault(block, {})[what] = times, of
-    return add_counts([result])
+    return sum_failure_counts([result])
 
 
 def failure_sentences(failures: FailureCounts) -> list[str]:
@@ -95,7 +96,7 @@ class Tries:
     did: BoolArray = field(default_factory=lambda: np.zeros(0, dtype=bool))
 
     def add_tries(self, run: IntArray, had: Any, did: BoolArray) -> "Tries":
-        """Return the tries with cases added, given each one's run, source mask and success.
+        """Return the tries with more cases: each one's run, bit mask of sources, and success.
 
         The cases of each run stand together.
         """

@@ -12,11 +12,11 @@ from dsa_des.arrays.column_values import (
     Text,
     constant_column,
     has_only_value,
-    is_null_column,
+    is_shared_nan_column,
     is_stored_once,
-    null_float_column,
+    shared_nan_column,
 )
-from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
+from dsa_des.arrays.run_ticks import RunTicks, shared_zero_run_numbers
 from dsa_des.arrays.types import AnyArray, IntArray
 from dsa_des.block.message import Message, slice_columns
 from dsa_des.block.recorded_columns import LEADING, PLATFORM
@@ -245,7 +245,7 @@ class Recorder:
                 run = np.full(len(columns["tick"]), part.run[0], dtype=np.int64)
                 yield table, {**columns, "replica": run}
 
-    def mark(self) -> int:
+    def count_for_rewind(self) -> int:
         """Return the number of message groups recorded so far, to which `rewind` can go back."""
         self._open = {}
         return len(self._groups)
@@ -256,7 +256,9 @@ class Recorder:
         del self._groups[mark:]
 
     def flush_if_large(self, run: int, tick: int) -> None:
-        """Write rows before a run's given tick to the sinks, if enough; no earlier ones follow."""
+        """Write the rows before a tick of a run to the sinks if they are many; no earlier rows may
+        follow.
+        """
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
             self._noted = [0, 0]
             self._join_recorded_messages()
@@ -271,7 +273,7 @@ class Recorder:
             later: list[tuple[str, Columns]] = []
             for block, columns in pieces:
                 instants = _instants_of_columns(columns)
-                count = instants.count_before(run, tick)
+                count = instants.count_before_run_tick(run, tick)
                 if count == len(instants):
                     ready.append((block, columns))
                     continue
@@ -339,8 +341,8 @@ class Recorder:
             _column_values(self._to_seconds(values), kind, len(columns["tick"]))
             for values, (_, columns) in zip(given, pieces, strict=True)
         ]
-        if all(map(is_null_column, parts)):
-            return null_float_column(len(instants))
+        if all(map(is_shared_nan_column, parts)):
+            return shared_nan_column(len(instants))
         return _concatenate(parts, order)
 
     def _to_seconds(self, values: Any) -> Any:
@@ -364,12 +366,12 @@ def _concatenate(parts: list[AnyArray], order: IntArray | None) -> AnyArray:
 def _instants_of_columns(columns: Columns) -> RunTicks:
     tick: Any = columns["tick"]
     run: Any = columns.get("replica")
-    return RunTicks(single_run_numbers(len(tick)) if run is None else run, tick)
+    return RunTicks(shared_zero_run_numbers(len(tick)) if run is None else run, tick)
 
 
 def _column_values(values: Any, kind: str, count: int) -> AnyArray:
     if values is None:
-        return null_float_column(count) if kind == "float64" else constant_column(0, count, kind)
+        return shared_nan_column(count) if kind == "float64" else constant_column(0, count, kind)
     values = np.asarray(values)
     # Whole numbers may be narrower: sinks widen them where they must be wide.
     if values.dtype == kind or (kind == "int64" and values.dtype.kind == "i"):

@@ -18,13 +18,13 @@ from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.errors import UsageError, did_you_mean
 from dsa_des.files.output_file import write_file
-from dsa_des.files.output_folder import RUN_JSON, add_file_list
+from dsa_des.files.output_folder import RUN_JSON, content_with_file_digests
 from dsa_des.files.output_names import new_folder_name
 from dsa_des.record.drawing import pictures_in
 from dsa_des.record.table_metadata import OF_ROWS
 from dsa_des.terminal.terminal import capture_html, capture_text
 from dsa_des.text.plain_json import json_text
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -50,7 +50,7 @@ def write_run_json(folder: Path, content: dict[str, Any]) -> None:
 
     A folder whose files are not listed is not replaced by later results.
     """
-    write_json(folder / RUN_JSON, add_file_list(folder, content))
+    write_json(folder / RUN_JSON, content_with_file_digests(folder, content))
 
 
 @dataclass(frozen=True, repr=False)
@@ -102,7 +102,7 @@ class Run:
         seed = self.info.get("seed", "?")
         where = "in memory" if self.path is None else f"in {shorten(str(self.path))}"
         rows = ", ".join(f"{name} ({len(table)} rows)" for name, table in self.tables.items())
-        tables = wrap(printable(rows), _WIDTH) or ["none"]
+        tables = wrap(escape_unprintable(rows), _WIDTH) or ["none"]
         lines = [
             f"Run of {shorten(repr(title))}, {seconds} s, seed {seed}, {where}",
             *(f"  {line}" for line in tables[:_MOST_LINES]),

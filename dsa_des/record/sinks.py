@@ -23,7 +23,9 @@ def call_or_note(
     *arguments: Any,
     unless: type[Exception] = BrokenPipeError,
 ) -> Any:
-    """Return a function's result; if it raises other than `unless`, note it and return None."""
+    """Return a function's result; if it raises anything but `unless`, append a text to `notes` and
+    return None.
+    """
     try:
         return call(*arguments)
     except unless:
@@ -79,11 +81,11 @@ class _Keeping:
 
     def _shrink_or_share(self, name: str, values: Any) -> Any:
         if isinstance(values, Text):
-            return Text(_narrowest_type(values.codes), values.names)
+            return Text(_in_narrowest_integer_type(values.codes), values.names)
         if isinstance(values, Instants):  # most often those of the rows
             return Instants(self._shrink_or_share("tick", values.ticks), values.ticks_per_s)
         if values.dtype.kind == "i":
-            values = _narrowest_type(values)
+            values = _in_narrowest_integer_type(values)
         if not values.strides[0]:
             return values
         for parts in self._parts.values():
@@ -96,8 +98,10 @@ class _Keeping:
         """Nothing to do."""
 
 
-def _narrowest_type(values: AnyArray) -> AnyArray:
-    """Return whole numbers in their smallest integer type; one stored value stays unchanged."""
+def _in_narrowest_integer_type(values: AnyArray) -> AnyArray:
+    """Return whole numbers in the smallest of int8, int16 and int32 that holds them; a column
+    stored as one value for all rows (stride 0) stays unchanged.
+    """
     if not values.strides[0]:
         return values
     ends = np.array([values.min(), values.max()])

@@ -59,7 +59,7 @@ class Notes:
         arrow = base64.b64encode(described.serialize().to_pybytes()).decode()
         return {"table": table, **self.run, "ARROW:schema": arrow}
 
-    def attach(self, tables: Mapping[str, Any]) -> "dict[str, pa.Table]":
+    def tables_with_metadata(self, tables: Mapping[str, Any]) -> "dict[str, pa.Table]":
         """Return tables by name as Arrow tables with metadata on the run and each column."""
         import pyarrow as pa
 

@@ -45,7 +45,7 @@ def replica_scene(scene: Scene, replica: Replica) -> Scene:
         return replace(scene, seed=replica.seed)
     paths = {key: key_path(key) for key in replica.changes}
     try:
-        blocks, sections, duration = _change_all(scene, replica.changes, paths)
+        blocks, sections, duration = _change_all_at_once(scene, replica.changes, paths)
     except (ValidationError, ValueError, LookupError, TypeError):
         blocks, sections, duration = _change_one_by_one(scene, replica.changes, paths)
     wires = scene.wires
@@ -56,7 +56,7 @@ def replica_scene(scene: Scene, replica: Replica) -> Scene:
         file = SceneFile(scene.path, {})
         clocks = read_clocks(file, blocks)
         ticks_per_s = checked_ticks_per_s(file, blocks, clocks, wires, duration)
-        file.refuse()
+        file.raise_if_problems()
     made = replace(
         scene,
         seed=replica.seed,
@@ -70,12 +70,14 @@ def replica_scene(scene: Scene, replica: Replica) -> Scene:
     if made.stretches:
         file = SceneFile(scene.path, {})
         made.ticks_per_s = common_ticks_per_s(file, made)
-        file.refuse()
+        file.raise_if_problems()
     return made
 
 
 def _replica_stretch(stretch: Stretch, replica: Replica) -> Stretch:
-    """Return a stretch with a replica's changes, except to keys that the stretch changes."""
+    """Return a part of the scene between timed changes with a replica's changes, except to keys
+    that the timed changes set.
+    """
     fixed = [key_path(key) for key in stretch.keys]
     mine = {
         key: value
@@ -88,7 +90,9 @@ def _replica_stretch(stretch: Stretch, replica: Replica) -> Stretch:
 _Changed = tuple[dict[str, Block], dict[str, Any], Fraction | None]
 
 
-def _change_all(scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]) -> _Changed:
+def _change_all_at_once(
+    scene: Scene, changes: Mapping[str, Any], paths: Mapping[str, Any]
+) -> _Changed:
     """Return (blocks, sections, duration) with all changes made at once, tables validated once.
 
     Raises whatever is wrong with any change.
@@ -209,7 +213,7 @@ def _replace_value(old: Any, path: tuple[str | int, ...], value: Any) -> Any:
         return model.model_validate(given)
     if isinstance(old, list | tuple):
         items = list(old)
-        index, rest = find_item(items, path)
+        index, rest = item_index_and_path_rest(items, path)
         items[index] = _replace_value(items[index], rest, value)
         return items
     if isinstance(old, dict):
@@ -228,7 +232,7 @@ def _replace_values(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> A
     for path, value in changes.items():
         first, rest = path[0], path[1:]
         if isinstance(old, list | tuple):
-            first, rest = find_item(list(old), path)
+            first, rest = item_index_and_path_rest(list(old), path)
         parts.setdefault(first, {})[rest] = value
     if isinstance(old, BaseModel):
         model = type(old)
@@ -248,7 +252,9 @@ def _replace_values(old: Any, changes: Mapping[tuple[str | int, ...], Any]) -> A
     raise ValueError
 
 
-def find_item(items: list[Any], path: tuple[str | int, ...]) -> tuple[int, tuple[str | int, ...]]:
+def item_index_and_path_rest(
+    items: list[Any], path: tuple[str | int, ...]
+) -> tuple[int, tuple[str | int, ...]]:
     """Return the item's index that a path's start names (number or name), and the path's rest.
 
     Names may hold the dots at which the path was split.

@@ -23,7 +23,12 @@ from pydantic import AfterValidator, BaseModel, BeforeValidator, PlainSerializer
 
 from dsa_des.block.component import ClockedParameters, Component, Parameters
 from dsa_des.errors import SceneError
-from dsa_des.replicas.changed_scene import Replica, find_item, key_path, replica_scene
+from dsa_des.replicas.changed_scene import (
+    Replica,
+    item_index_and_path_rest,
+    key_path,
+    replica_scene,
+)
 from dsa_des.scene.block_table import BlockOptions
 from dsa_des.scene.scene import Scene
 from dsa_des.time.clock import NANOSECONDS, parse_rational
@@ -199,7 +204,7 @@ def _locate_field(parameters: Any, path: Path) -> tuple[Path, type[BaseModel], s
                 return tuple(found), model, name
         elif type(old) in (list, tuple):
             try:
-                index, path = find_item(old, path)
+                index, path = item_index_and_path_rest(old, path)
             except ValueError:
                 raise _NoColumn from None
             found.append(index)

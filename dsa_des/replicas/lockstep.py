@@ -215,9 +215,11 @@ class Replicas(Timeline):
                 component.context.duration_s = ended
             self._report(number, component.report())
 
-    def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
-        """Return a changing block's instances by stretch; NotInLockStep if these cannot serve."""
-        stretched, name = super().stretched(instances), instances[0].name
+    def block_switching_by_stretch(self, instances: Sequence[Component]) -> StretchedBlock | None:
+        """Return what runs the instance in force at each time for a block changed while it runs,
+        None if one serves throughout; NotInLockStep if replicas cannot share them.
+        """
+        stretched, name = super().block_switching_by_stretch(instances), instances[0].name
         if stretched is not None and not all(self._is_shared(name, one) for one in instances):
             raise NotInLockStep(f"block {name} changes while it runs, and cannot be shared")
         return stretched
@@ -225,7 +227,9 @@ class Replicas(Timeline):
     def clock_specs(
         self, name: str, component: Component, stretch: int | None = None
     ) -> list[ClockSpec]:
-        """Return each replica's specification of a block's clock."""
+        """Return each replica's specification of a block's clock, in stretch `stretch` of the run;
+        empty if the block has none, NotInLockStep if only some replicas have one.
+        """
         every: list[Any] = []
         known: dict[int, Any] = {}  # by the identity of parameters, which many replicas share
         for parameters in self._parameters_of(name, stretch):
@@ -262,11 +266,13 @@ class Replicas(Timeline):
         return super().windows(longest_ticks, scans, horizon_ticks, rewinder)
 
     def grain(self, window: int | None) -> Grain:
-        """Return how blocks run: in windows, loops opened where nothing returns within one."""
+        """Return how blocks run: all in time windows, loops cut at their longest delays."""
         return Grain(set(self.scene.blocks), False, longest_delay_cut_edges(self.scene), {})
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
-        """Collect reports of blocks with instances per replica, and close these; shared: none."""
+        """Close instances of single replicas and collect their reports; return {}, as no block
+        reports on all runs.
+        """
         for block in self.split.values():
             block.close_instances(len(self._scenes))
         if self._report is not None:

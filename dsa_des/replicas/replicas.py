@@ -12,8 +12,8 @@ from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.failure_counts import (
     FailureCounts,
     FailuresByRun,
-    add_counts,
     sum_counts_over_runs,
+    sum_failure_counts,
 )
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
@@ -78,7 +78,7 @@ def run_replicas(
     holds. What is returned is in the order of `replicas`, and each is identical to
     a run of its own.
     """
-    failed, scenes = _make_replica_scenes(scene, replicas)
+    failed, scenes = _failures_and_valid_scenes(scene, replicas)
     ran: list[Recorded | Failed] = []
     runs = len(replicas) if runs is None else runs
     for part in _split_by_memory(scenes, wanted, most):
@@ -88,7 +88,7 @@ def run_replicas(
     return [next(outcomes) if one is None else one for one in failed]
 
 
-def _make_replica_scenes(
+def _failures_and_valid_scenes(
     scene: Scene, replicas: Sequence[Replica]
 ) -> tuple[list[Recorded | Failed | None], Sequence[Scene]]:
     """Return `Failed` per invalid replica, None for others, and the scenes of those others."""
@@ -121,8 +121,8 @@ def _split_by_memory(
         yield scenes[start : start + most]
 
 
-def lock_step_refusal(scene: Scene, replicas: Sequence[Replica]) -> str | None:
-    """Return why replicas cannot run in lock step, as far as it shows before they run."""
+def reason_against_lock_step(scene: Scene, replicas: Sequence[Replica]) -> str | None:
+    """Return why replicas cannot run in lock step, as far as a trial setup shows it; else None."""
     try:
         together = Replicas(replica_scenes(scene, replicas))
         Simulation(together.scene, timeline=together)
@@ -204,7 +204,7 @@ def failure_counts_of_runs(outcomes: Iterable[Recorded | Failed]) -> FailureCoun
             parts.append(one.failure_counts)
             if (shared := one.shared) is not None:
                 together.setdefault(id(shared), (shared, []))[1].append(one.number)
-    return add_counts(
+    return sum_failure_counts(
         [
             *parts,
             *(

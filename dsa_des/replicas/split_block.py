@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
+from dsa_des.arrays.run_ticks import RunTicks, shared_zero_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.message import STATIC, Message
@@ -57,7 +57,7 @@ class SplitBlock:
             if number not in self._instances:
                 self._instances[number] = self.make(number)
                 self._made.add(number)
-            part = _rows_of_replica(wake, slice(first, end), number)
+            part = _wake_of_replica(wake, slice(first, end), number)
             for port, waiting in self._waiting.pop(number, {}).items():
                 part._arrived = {
                     **part._arrived,
@@ -94,7 +94,7 @@ class SplitBlock:
                 self._finished(number, self._instances.pop(number))
 
 
-def _rows_of_replica(wake: Wake, rows: slice, number: int) -> Wake:
+def _wake_of_replica(wake: Wake, rows: slice, number: int) -> Wake:
     """Return a wake with the rows of one replica, numbered as run 0, as if it ran alone."""
     held = {}
     for port, (message, row_at) in wake._held.items():
@@ -132,7 +132,7 @@ def _arrivals_of_replica(new: Arrivals, number: int) -> Arrivals | None:
 
 def _as_single_run(message: Message) -> Message:
     """Return a message of one run with its run number set to 0, as if that run were alone."""
-    return message.with_runs(single_run_numbers(len(message)))
+    return message.with_runs(shared_zero_run_numbers(len(message)))
 
 
 def _append_arrivals(one: list[Arrivals], other: list[Arrivals]) -> list[Arrivals]:
@@ -153,7 +153,7 @@ def _shifted_rows_within(asked: IntArray, rows: slice) -> IntArray:
 
 
 def _concatenate(parts: list[Message]) -> Message:
-    """Join messages of one port; what is the same for all rows must be the same for all parts."""
+    """Return messages joined; NotInLockStep if a field that holds for all rows differs."""
     first = parts[0]
     for item in fields(first):
         if item.metadata.get("per") != STATIC or item.name in first.joins_static:

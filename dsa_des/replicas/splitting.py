@@ -79,7 +79,7 @@ class _Repetition:
         #: The weight of the runs of this stage by that of all first runs; and of one of them.
         self.share, self.unseen = 1.0, 1.0 / len(roots)
 
-    def count_flown_runs(self, weights: FloatArray) -> None:
+    def count_runs_and_set_weights(self, weights: FloatArray) -> None:
         """Count the runs of this stage as flown, and in the first stage set their weights."""
         self.flown += len(self.runs)
         if self.stage == 0:
@@ -98,7 +98,7 @@ class _Repetition:
         self.share = total / self._whole
         self.unseen = self.share / count
         uniform = (key_of(self._seed, "branches", self.stage) >> 11) * 2.0**-53
-        parents = some[resample_parents(self.weights[some], count, uniform)]
+        parents = some[parent_indices_of_branches(self.weights[some], count, uniform)]
         self.runs = [
             Replica(
                 branch_seed(
@@ -114,7 +114,7 @@ class _Repetition:
         return key_of(self._seed, "branch", self.stage, number) >> 1
 
 
-def resample_parents(weights: FloatArray, count: int, uniform: float) -> IntArray:
+def parent_indices_of_branches(weights: FloatArray, count: int, uniform: float) -> IntArray:
     """Return the index of each of `count` branches' parent, in proportion to the weights.
 
     Of every run there are as many as expected, to the whole number below or above (systematic
@@ -155,7 +155,7 @@ def run_repetitions(
             mine = slice(end, end := end + len(one.runs))
             one.error = next((text for text in flown.errors[mine] if text), None)
             if one.error is None:
-                one.count_flown_runs(flown.weights[mine])
+                one.count_runs_and_set_weights(flown.weights[mine])
                 one.branch_at_next_level(flown.reached_s[0, mine])
     return [
         Repeated(one.share if one.runs else 0.0, one.unseen, one.flown, one.error) for one in every
@@ -176,7 +176,7 @@ def find_levels(
         flown = fly(pilot.runs, np.full(len(roots), -1), candidates.tolist())
         if said := next((text for text in flown.errors if text), None):
             raise ValueError(f"of the pilot of splitting: {said}")
-        pilot.count_flown_runs(flown.weights)
+        pilot.count_runs_and_set_weights(flown.weights)
         share = (~np.isnan(flown.reached_s) @ pilot.weights) / pilot.weights.sum()
         nearer = np.flatnonzero((share > 0.0) & (candidates < (levels[-1] if levels else np.inf)))
         if not len(nearer):

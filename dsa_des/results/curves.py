@@ -34,7 +34,9 @@ _WIDE_IN, _APART_PT = 9.0, 5.0
 _FEWEST_BINS, _MOST_BINS = 5, 40
 
 
-def _series_style(mark: tuple[str, str] | None, number: int, of: int) -> tuple[str, str]:
+def _colour_and_marker_of_series(
+    mark: tuple[str, str] | None, number: int, of: int
+) -> tuple[str, str]:
     """Return series `number`'s (colour, marker): `mark` if alone, else the next of `STYLES`."""
     return mark if of == 1 and mark is not None else STYLES[number % len(STYLES)]
 
@@ -53,7 +55,7 @@ def _group_lines_by_series(
     return series
 
 
-def draw_axis(
+def draw_result_against_axis(
     target: Target, axes: Sequence[str], lines: Sequence[Line], metric: str, axis: str,
     by: str | None, category: bool, shown: Sequence[Compared], title: str, confidence: float,
 ) -> None:  # fmt: skip
@@ -66,7 +68,7 @@ def draw_axis(
         grid = figure.subplots(2 if shown else 1, 1, squeeze=False, sharex=True)[:, 0]
         top = grid[0]
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
-            colour, marker = _series_style(some[0].result.mark, number, len(series))
+            colour, marker = _colour_and_marker_of_series(some[0].result.mark, number, len(series))
             x = np.array([where[line.at[index]] for line in some])
             known = any(not np.isnan(line.estimate.half_width) for line in some)
             seen = series_label or "simulated" + f", {100 * confidence:g} % interval" * known
@@ -179,7 +181,7 @@ def _draw_differences(
         groups.setdefault(item.at, []).append(item)
     others = [name for name in names if name != axis]
     for number, (at, items) in enumerate(list(groups.items())[:_MOST_LINES]):
-        colour, marker = _series_style(shown[0].result.mark, number, len(groups))
+        colour, marker = _colour_and_marker_of_series(shown[0].result.mark, number, len(groups))
         x = np.array([where[item.value] for item in items])
         y = np.array([item.difference.paired.value for item in items])
         half = np.nan_to_num([item.difference.paired.half_width for item in items])
@@ -211,7 +213,7 @@ def draw_polar(
         polar.set(theta_zero_location="N", theta_direction=-1)
         series = list(_group_lines_by_series(axes, lines, axis, None).items())
         for number, (series_label, some) in enumerate(series[:_MOST_LINES]):
-            colour, marker = _series_style(some[0].result.mark, number, len(series))
+            colour, marker = _colour_and_marker_of_series(some[0].result.mark, number, len(series))
             some = sorted(some, key=lambda line: line.at[index])
             angle = np.radians([line.at[index] for line in some])
             low, value, high = (
@@ -264,7 +266,7 @@ def draw_histogram(
     with _titled_axes(path, title) as axes:
         edges = _bin_edges(every, max((len(values) for _, values, _ in known), default=0))
         for number, (series_label, values, runs) in enumerate(known):
-            colour = _series_style(mark, number, len(known))[0]
+            colour = _colour_and_marker_of_series(mark, number, len(known))[0]
             counts = np.histogram(values, edges)[0]
             axes.stairs(
                 counts, edges, color=colour, lw=1.4, label=_count_label(series_label, values, runs)
@@ -286,7 +288,7 @@ def draw_cdf(
     with _titled_axes(path, title) as axes:
         for number, (series_label, values) in enumerate(shown):
             ascending = np.sort(values[~np.isnan(values)])
-            colour = _series_style(mark, number, len(shown))[0]
+            colour = _colour_and_marker_of_series(mark, number, len(shown))[0]
             if not len(ascending):
                 axes.plot([], [], color=colour, label=f"{series_label}: no value")
                 continue
@@ -324,7 +326,7 @@ def _bin_edges(values: FloatArray, most: int) -> FloatArray:
 Series = tuple[str, Sequence[float], Sequence[Line]]
 
 
-def draw_series(
+def draw_numbered_results(
     path: Target,
     series: Sequence[Series],
     metric: str,

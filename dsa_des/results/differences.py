@@ -8,20 +8,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray, IntArray
-from dsa_des.results.ratio import PairedRatio, encounter_influences, paired_ratio
+from dsa_des.results.ratio import PairedRatio, error_share_of_encounters, paired_ratio
 from dsa_des.results.statistics import (
     FEW,
     Estimate,
     clip_estimate,
+    estimate_from_standard_error,
     estimate_mean,
     estimate_quantile,
-    normal_estimate,
     scale_by_power_of_two,
     standard_error,
     standard_error_from_interval,
     two_sided_normal_quantile,
     two_sided_t_quantile,
-    unseen_event_moments,
+    unseen_event_mean_and_square,
 )
 
 _RESAMPLES = 1000
@@ -159,8 +159,8 @@ def quantile_difference(
         drawn[k] = high - low
     apart = math.hypot(*(standard_error_from_interval(end, confidence) for end in ends))
     return EstimatedDifference(
-        normal_estimate(value, float(drawn.std(ddof=1)), len(one), False, confidence),
-        normal_estimate(value, apart, len(one), False, confidence),
+        estimate_from_standard_error(value, float(drawn.std(ddof=1)), len(one), False, confidence),
+        estimate_from_standard_error(value, apart, len(one), False, confidence),
         *alone,
     )
 
@@ -255,7 +255,9 @@ def ratio_difference(
         )  # fmt: skip
         ratios.append(ratio)
         if not ratio.reason:
-            parts.append(encounter_influences(below, above, weight, ratio.ratio, some, predicted))
+            parts.append(
+                error_share_of_encounters(below, above, weight, ratio.ratio, some, predicted)
+            )
     if len(parts) < 2:
         none = Estimate(np.nan, np.nan, np.nan, 0, True)
         return EstimatedDifference(none, none, *alone)
@@ -273,8 +275,8 @@ def ratio_difference(
     )
     apart = float(np.sqrt((each**2).sum() + alike + more))
     return EstimatedDifference(
-        normal_estimate(value, joint, each.shape[1], few, confidence),
-        normal_estimate(value, apart, each.shape[1], few, confidence),
+        estimate_from_standard_error(value, joint, each.shape[1], few, confidence),
+        estimate_from_standard_error(value, apart, each.shape[1], few, confidence),
         *alone,
     )
 
@@ -286,7 +288,7 @@ def _variance_of_unseen_event(nominal: FloatArray) -> float:
     proportion to their weights.
     """
     part, _ = scale_by_power_of_two(nominal)
-    return unseen_event_moments(part)[1] / math.fsum(part) ** 2
+    return unseen_event_mean_and_square(part)[1] / math.fsum(part) ** 2
 
 
 def ratio_as_estimate(ratio: PairedRatio) -> Estimate:

@@ -11,17 +11,17 @@ import numpy as np
 from dsa_des.arrays.types import FloatArray
 from dsa_des.results.curves import (
     Series,
-    draw_axis,
     draw_cdf,
     draw_histogram,
+    draw_numbered_results,
     draw_polar,
+    draw_result_against_axis,
     draw_scatter,
-    draw_series,
 )
 from dsa_des.results.labels import value_label
-from dsa_des.results.maps import Target, draw_heat, draw_map
+from dsa_des.results.maps import Target, draw_contour_map, draw_heat_map
 from dsa_des.results.record import FigureRecord
-from dsa_des.results.summary import Line, result_numbers_of_series
+from dsa_des.results.summary import Line, numbers_by_series_result
 from dsa_des.results.tables import Tables
 
 #: Letters of a figure's title.
@@ -46,7 +46,7 @@ def draw_figures(
         if figure.kind == "run":
             paths += [] if draw_run is None else draw_run(figure.cell, figure.replica)
             continue
-        drawn = _figure_stream(f"figure-{number + 1:02d}-{figure.kind}.png")
+        drawn = _named_figure_buffer(f"figure-{number + 1:02d}-{figure.kind}.png")
         if draw_figure(drawn, tables, figure):
             paths.append(_write_figure(tables, drawn))
     if tables.compared and tables.baseline is not None and tables.baseline[0].startswith("swap."):
@@ -54,7 +54,7 @@ def draw_figures(
     return paths
 
 
-def _figure_stream(name: str) -> io.BytesIO:
+def _named_figure_buffer(name: str) -> io.BytesIO:
     drawn = io.BytesIO()
     drawn.name = name
     return drawn
@@ -76,7 +76,7 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         return _draw_spread(target, tables, figure, title)
     if figure.kind == "series":
         series = _numbered_result_series(tables, metric)
-        draw_series(target, series, metric, title, confidence, figure.freedom,
+        draw_numbered_results(target, series, metric, title, confidence, figure.freedom,
                     figure.limits)  # fmt: skip
         return True
     if not axes:
@@ -88,9 +88,9 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         if x == y:
             return False
         if figure.kind == "heat":
-            draw_heat(target, axes, lines, metric, x, y, title)
+            draw_heat_map(target, axes, lines, metric, x, y, title)
         else:
-            draw_map(target, axes, lines, metric, x, y, figure.limits, title, confidence)
+            draw_contour_map(target, axes, lines, metric, x, y, figure.limits, title, confidence)
         return True
     axis = axes[axes.index(figure.axis or axes[0])]
     if figure.kind == "polar":
@@ -99,7 +99,8 @@ def draw_figure(target: Target, tables: Tables, figure: FigureRecord) -> bool:
         own = tables.baseline is not None and tables.baseline[0] == axis
         compared = [c for c in tables.compared if own and c.result.name == metric]
         category = any(a.category for a in tables.record.axes if a.column == axis)
-        draw_axis(target, axes, lines, metric, axis, figure.lines, category, compared, title,
+        draw_result_against_axis(target, axes, lines, metric, axis, figure.lines, category,
+        compared, title,
                    confidence)  # fmt: skip
     return True
 
@@ -118,7 +119,7 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
         return False
     axis = next((name for name in rows.axes if figure.axis in (None, name)), None)
     by_value: dict[Any, list[FloatArray]] = {}
-    for at, chosen in rows.each_place():
+    for at, chosen in rows.row_indices_by_axis_values():
         value = None if axis is None else at[rows.axes.index(axis)]
         by_value.setdefault(value, []).append(rows.column(metric)[chosen].astype(float))
     series = [
@@ -132,7 +133,7 @@ def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: st
 
 def _numbered_result_series(tables: Tables, metric: str) -> list[Series]:
     """Return (label, numbers, lines) of ``METRIC.NUMBER`` for each combination of axis values."""
-    known = result_numbers_of_series(metric, [line.result.name for line in tables.lines])
+    known = numbers_by_series_result(metric, [line.result.name for line in tables.lines])
     by_place: dict[tuple[Any, ...], dict[str, Line]] = {}
     for line in tables.lines:
         if line.result.name in known:
@@ -154,10 +155,10 @@ def _draw_scatters(tables: Tables, axis: str, baseline: Any, only: Sequence[str]
     paths = []
     for value, others, base, chosen in tables.rows.comparisons_with_baseline(axis, baseline):
         at = (*others[:index], value, *others[index:])
-        for metric in tables.notable_results(only):
-            _, first, second = tables.rows.paired_values(metric, base, chosen)
+        for metric in tables.names_of_scatter_results(only):
+            _, first, second = tables.rows.paired_means_by_unit(metric, base, chosen)
             name = "-".join(["scatter", metric, *map(str, at)])
-            drawn = _figure_stream(f"{safe_file_name(name)}.png")
+            drawn = _named_figure_buffer(f"{safe_file_name(name)}.png")
             names = str(baseline), str(value)
             draw_scatter(drawn, first, second, names, metric, _shorten_title(tables.record.title))
             paths.append(_write_figure(tables, drawn))

@@ -22,7 +22,7 @@ from dsa_des.files.sealed_files import (
     read_regular_file,
     seal_parquet,
 )
-from dsa_des.record.failure_counts import FailureCounts, add_counts
+from dsa_des.record.failure_counts import FailureCounts, sum_failure_counts
 from dsa_des.results.record import StudyHead, StudyRecord
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ class StudyFolder:
         if self.path.exists() and not self.path.is_dir():
             raise UsageError(f"--out {self.path}: is a file; a folder is needed")
         try:
-            self._refuse_foreign()
+            self._raise_if_folder_is_foreign()
             self.parts.mkdir(parents=True, exist_ok=True)
             self._take_lock()
             # Only now is all that is there ours: before, it may have been another process's.
@@ -113,7 +113,7 @@ class StudyFolder:
             os.close(self._lock)
             self._lock = None
 
-    def _refuse_foreign(self) -> None:
+    def _raise_if_folder_is_foreign(self) -> None:
         if self.parts.is_symlink():
             raise UsageError(f"{self.parts}: is a link; the parts of a study are in a folder")
         if os.path.lexists(self.path / STUDY_JSON) or not self.path.exists():
@@ -239,7 +239,7 @@ class StudyFolder:
         for name in self.part_names() if names is None else names:
             table = self._read_sealed(self.parts / f"{name}.parquet", name, ["cell"])
             parts.append({} if table is None else failure_counts_of_part(table))
-        return add_counts(parts)
+        return sum_failure_counts(parts)
 
     @property
     def parts_destination(self) -> Parts:
@@ -266,7 +266,8 @@ class StudyFolder:
     def each_part(
         self, before_round: int | None = None, columns: Sequence[str] | None = None
     ) -> Iterator["pa.Table"]:
-        """Yield each part's table, by part name; UsageError at the end if some were unreadable.
+        """Yield parts' tables by name (only rounds below `before_round`, only `columns`, if given);
+        UsageError at the end if any was unreadable.
 
         Only those of rounds before one, and only some columns of parts checked before.
         """

@@ -73,7 +73,7 @@ def short_text(value: object) -> str:
     return shorten(value)
 
 
-def round_to_interval(half: float, *numbers: float) -> list[str]:
+def texts_rounded_to_interval(half: float, *numbers: float) -> list[str]:
     """Return numbers as texts, rounded to the second significant digit of the half-width `half`."""
     places = 1 - math.floor(math.log10(half))
     return [f"{round(number, places) + 0.0:,.{max(places, 0)}f}" for number in numbers]
@@ -86,7 +86,7 @@ def format_with_interval(value: float, half: float) -> str:
     sign = "+" if value > 0 else ""
     if not 0.0 < half < math.inf:
         return sign + (f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}")
-    return sign + " ± ".join(round_to_interval(half, value, half))
+    return sign + " ± ".join(texts_rounded_to_interval(half, value, half))
 
 
 def _split_unit(name: str) -> tuple[str, str]:

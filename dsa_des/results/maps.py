@@ -19,7 +19,7 @@ _MOST_PANELS, _TITLE = 6, 80
 _PARTS = ("value", "low", "high")
 
 
-def draw_heat(
+def draw_heat_map(
     path: Target,
     axes_of: Sequence[str],
     lines: Sequence[Line],
@@ -78,7 +78,7 @@ def format_three_digits(value: float) -> str:
     return f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def draw_map(
+def draw_contour_map(
     path: Target, axes_of: Sequence[str], lines: Sequence[Line], metric: str, x: str, y: str,
     limits: Sequence[float], title: str, confidence: float,
 ) -> None:  # fmt: skip

@@ -61,7 +61,7 @@ class Explained(StrictRecord):
     scenes: list[SceneRecord]
 
 
-def versions() -> dict[str, str]:
+def package_versions() -> dict[str, str]:
     """Return the versions of this program, of Python and of the packages it computes with."""
     result = {"dsa_des": __version__, "Python": platform.python_version()}
     for name in _PACKAGES:
@@ -101,15 +101,15 @@ class MeasuredErrors(StrictRecord):
 
 def read_explained(folder: StudyFolder) -> Explained | None:
     """Return the record of models and versions in the study's folder; None if none can be read."""
-    return _read_record(folder, EXPLAINED, Explained)
+    return _read_record_if_valid(folder, EXPLAINED, Explained)
 
 
 def read_model_errors(folder: StudyFolder) -> MeasuredErrors | None:
     """Return the measured model errors in the study's folder; None where none can be read."""
-    return _read_record(folder, ERRORS, MeasuredErrors)
+    return _read_record_if_valid(folder, ERRORS, MeasuredErrors)
 
 
-def _read_record(folder: StudyFolder, name: str, model: type[_Record]) -> _Record | None:
+def _read_record_if_valid(folder: StudyFolder, name: str, model: type[_Record]) -> _Record | None:
     try:
         return model.model_validate_json(read_regular_file(folder.path / name, _MOST_BYTES))
     except (OSError, ValidationError):

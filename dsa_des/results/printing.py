@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 from dsa_des.record.failure_counts import failure_sentences
-from dsa_des.results.labels import round_to_interval, short_text
+from dsa_des.results.labels import short_text, texts_rounded_to_interval
 from dsa_des.results.statistics import Estimate
 from dsa_des.results.summary import Answer, Compared, Line, one_sided_confidence
 from dsa_des.results.tables import Tables, cut_off_text
@@ -103,7 +103,7 @@ def answer_cells(tables: Tables, answer: Answer) -> list[str]:
     notes = ["uneven: a cheaper one meets it, a dearer one does not"] if answer.uneven else []
     notes += ["few"] if estimate.few else []
     return [
-        answer.requirement.text(), answer.requirement.axis, tables.other_axes_text(answer),
+        answer.requirement.text(), answer.requirement.axis, tables.other_axis_values_text(answer),
         "none" if answer.value is None else short_text(answer.value),
         *rounded_value_and_interval(estimate),
         "none" if answer.estimated is None else short_text(answer.estimated),
@@ -222,7 +222,7 @@ def _show_differences(console: Any, tables: Tables, names: set[str]) -> None:
 
 
 def _show_event_ratios(console: Any, tables: Tables, shown: Sequence[Compared]) -> None:
-    """Print a table of how often each event happens relative to the baseline, with weights."""
+    """Print each event's weighted frequency relative to the baseline, with its interval."""
     assert tables.baseline is not None
     axis, baseline = tables.baseline
     others = [name for name in tables.rows.axes if name != axis]
@@ -262,7 +262,7 @@ def rounded_value_and_interval(estimate: Estimate) -> tuple[str, str]:
     half = (high - low) / 2
     if not _NOTHING < half < math.inf:
         return short_text(value), interval_text(replace(estimate, low=low, high=high))
-    shown = round_to_interval(half, value, low, high)
+    shown = texts_rounded_to_interval(half, value, low, high)
     return shown[0], f"{shown[1]} to {shown[2]}" + (" *" if estimate.few else "")
 
 

@@ -37,12 +37,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dsa_des.arrays.types import AnyArray, BoolArray, FloatArray
-from dsa_des.errors import shown_value
+from dsa_des.errors import shortened_repr
 from dsa_des.results.statistics import (
-    gamma_interval,
+    gamma_interval_of_ratio,
     resampled_ratios,
     scale_by_power_of_two,
-    unseen_event_moments,
+    unseen_event_mean_and_square,
 )
 
 #: Intervals: by gamma distributions, of the logarithm of the ratio by its standard error, or of
@@ -108,7 +108,8 @@ def paired_ratio(
     resamples: int = 4000,
     seed: int = 0,
 ) -> PairedRatio:
-    """Return mitigated to nominal events over the same encounters: ratio, error and interval.
+    """Return the weighted ratio of mitigated to nominal events over the same encounters, with
+    standard error, interval and counts.
 
     Parameters
     ----------
@@ -194,7 +195,7 @@ def paired_ratio(
     # Rounding alone leaves residuals where m is R n throughout.
     certain = error <= 1e-12 * max(ratio, 1.0)
     if method == "gamma":
-        interval = gamma_interval(x, y, ratio, tail)
+        interval = gamma_interval_of_ratio(x, y, ratio, tail)
     elif certain:
         # The same number of events, of which none went otherwise, has this upper limit.
         possible = -math.log(tail) * math.fsum(x**2) / below**2
@@ -209,7 +210,10 @@ def paired_ratio(
 
         reach = math.exp(float(ndtri(1.0 - tail)) * error / ratio)
         interval = ratio / reach, ratio * reach
-    few = method != "gamma" and math.fsum(y**2) < _FEW * unseen_event_moments(np.maximum(x, y))[1]
+    few = (
+        method != "gamma"
+        and math.fsum(y**2) < _FEW * unseen_event_mean_and_square(np.maximum(x, y))[1]
+    )
     return PairedRatio(
         ratio, added / below, left / below, error, interval, unpaired, sizes, *counts,
         below / total, above / total, method, "", few, len(each),
@@ -252,7 +256,8 @@ def share_from_flown_sample(
     predicted: FloatArray | None,
     **options: Any,
 ) -> PairedRatio:
-    """Return the share of `whole` events that are also `part`, estimated from flown encounters.
+    """Return the share of `whole` events that are also `part`, by the surer of two estimators from
+    flown encounters, interval cut at 1.
 
     The part by all events, as `paired_ratio` has it; or by those that the flown ones stand for (J.
     Hájek's ratio), which is surer where the share is large, and never above 1: the surer of both.
@@ -276,7 +281,7 @@ def share_from_flown_sample(
     return replace(one, interval=(low, min(high, 1.0)))
 
 
-def encounter_influences(
+def error_share_of_encounters(
     nominal: npt.ArrayLike,
     mitigated: npt.ArrayLike,
     weight: npt.ArrayLike | None,
@@ -284,7 +289,7 @@ def encounter_influences(
     stands_for: npt.ArrayLike | None = None,
     predicted: npt.ArrayLike | None = None,
 ) -> FloatArray:
-    """Return contributions to a ratio's error, (encounters,); their squares sum to its variance.
+    """Return each encounter's share of a ratio's error; their squares sum to its variance.
 
     Values are those of `paired_ratio`.
     """
@@ -314,8 +319,8 @@ def _unweighted_numerator_terms(
 def redistribute_lost_runs(
     stands_for: FloatArray, lost: Sequence[float], of: BoolArray
 ) -> FloatArray:
-    """Return `stands_for` after sharing out, among the other flown runs of the cell, the runs that
-    flown runs without a result stood for.
+    """Return `stands_for` with what flown runs without result stood for shared out among the flown
+    runs of the cell (mask `of`).
 
     These leave out themselves, as in any study; the others for which they were to stand are shared
     by those flown `of` the same cell. `lost` says for how many each stood, NaN of one of which that
@@ -401,7 +406,7 @@ def _refuse_values(what: str, values: FloatArray, bad: AnyArray, allowed: str) -
     if bad.any():
         index = int(np.argmax(bad))
         value = float(values[index])
-        shown = "missing" if math.isnan(value) else shown_value(value)
+        shown = "missing" if math.isnan(value) else shortened_repr(value)
         raise ValueError(f"{what} of encounter {index} is {shown}: {allowed}")
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from dsa_des.text.run_commands import format_value, run_command
+from dsa_des.text.run_commands import format_set_option_value, shell_command_of_run
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -314,18 +314,20 @@ class StudyRecord(StudyHead):
 
     def command(self, row: Mapping[str, Any]) -> str:
         """Return the command that repeats the run of a row of the parts."""
-        return run_command(self.scene, int(row["seed"]), *self.swaps_and_sets(row))
+        return shell_command_of_run(self.scene, int(row["seed"]), *self.swaps_and_sets(row))
 
     def swaps_and_sets(
         self, row: Mapping[str, Any]
     ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-        """Return (swaps, set values), (name, value) pairs that make a row's scene of the base."""
+        """Return (swaps, set values), both lists of (name, value), that turn the base scene into a
+        row's.
+        """
         swaps, sets = list(self.swaps), list(self.sets)
         indices = np.unravel_index(int(row["cell"]), [len(axis.values) for axis in self.axes])
         for axis, index in zip(self.axes, indices, strict=True):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
-        sets += [(draw.key, format_value(row[draw.column])) for draw in self.draws]
+        sets += [(draw.key, format_set_option_value(row[draw.column])) for draw in self.draws]
         return swaps, sets
 
 

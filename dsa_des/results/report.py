@@ -22,9 +22,9 @@ from dsa_des.results.models import (
     EffectRecord,
     MeasuredErrors,
     SceneRecord,
+    package_versions,
     read_explained,
     read_model_errors,
-    versions,
 )
 from dsa_des.results.printing import (
     RATIO_HEADS,
@@ -35,8 +35,8 @@ from dsa_des.results.printing import (
 from dsa_des.results.record import EVENT, FRACTION, NUMBER, RATIO
 from dsa_des.results.summary import Answer, Line, one_sided_confidence
 from dsa_des.results.tables import Tables, cut_off_text
-from dsa_des.text.run_commands import run_command
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.run_commands import shell_command_of_run
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 REPORT = "report.html"
 _LARGEST_PICTURE = 20 * 2**20
@@ -60,10 +60,10 @@ def study_report(folder: StudyFolder) -> bytes:
     tables = Tables(folder.record, folder)
     record, stored, first = tables.record, tables.rows.stored, tables.rows.stored.first
     explained = read_explained(folder)
-    explain = run_command(record.scene, record.seed, record.swaps, record.sets)
+    explain = shell_command_of_run(record.scene, record.seed, record.swaps, record.sets)
     explain = explain.replace("dsa-des run ", "dsa-des explain ", 1)
-    begun, now = explained.versions if explained else {}, versions()
-    pictures = _figure_contents(folder)
+    begun, now = explained.versions if explained else {}, package_versions()
+    pictures = _base64_png_figures(folder)
     answering = [one for one in pictures if "map" in one[0] or "requirement" in one[0]]
     answering = answering or pictures[:1]
     template = PAGE_HEAD + read_page_template("study.html")
@@ -117,7 +117,7 @@ def study_report(folder: StudyFolder) -> bytes:
         ],
         undone=failure_sentences(folder.failure_counts()),
         packages=[(name, begun.get(name, ""), now.get(name, "")) for name in {**begun, **now}],
-        hashes=_file_hashes(folder),
+        hashes=_labelled_sha256_hashes(folder),
         commands=[
             record.repeat or f"dsa-des study {record.study}",
             f"dsa-des study show {folder.path}",
@@ -150,7 +150,7 @@ def _escaped_text(value: Any) -> Markup:
     """Return a value as text of a page, on one line and of bounded length."""
     if isinstance(value, Markup):
         return value
-    return Markup(escape(shorten(printable(str(value)), _LONGEST)))
+    return Markup(escape(shorten(escape_unprintable(str(value)), _LONGEST)))
 
 
 def _drop_empty_columns(
@@ -165,11 +165,13 @@ def _drop_empty_columns(
 def _preformatted_lines(lines: Iterable[str]) -> Markup:
     """Return lines, escaped, as an HTML ``pre`` element."""
     some = list(lines)[:_MOST_ROWS]
-    return Markup("<pre>" + "\n".join(escape(printable(line)) for line in some) + "</pre>")
+    return Markup("<pre>" + "\n".join(escape(escape_unprintable(line)) for line in some) + "</pre>")
 
 
 def _summary_cells(line: Line, exact: bool = False) -> tuple[Any, ...]:
-    """Return a summary line's row: rounded to the interval, or if `exact` name and five digits."""
+    """Return a table row of a summary line: label and values rounded to the interval, or with
+    `exact` the name and five digits.
+    """
     e = line.estimate
     said = (readable_label(line.result.name), *rounded_value_and_interval(e))
     if exact:
@@ -198,7 +200,9 @@ def _interval_methods_text(tables: Tables) -> str:
 
 
 def _requirement_tables(tables: Tables) -> list[tuple[str, list[str], list[list[str]]]]:
-    """Return (title, headings, rows) per requirement, a column per value of the last other axis."""
+    """Return (title, headings, rows) for each requirement, with one column for each value of the
+    last of the axes other than the one that is searched.
+    """
     pivots = []
     for requirement in tables.record.requirements:
         mine = [one for one in tables.answers if one.requirement == requirement][:_MOST_ROWS]
@@ -273,7 +277,7 @@ def _effect_rows(effects: Sequence[EffectRecord], simulated: bool) -> list[tuple
     return [(", ".join(blocks), effect, why) for (effect, why), blocks in together.items()]
 
 
-def _figure_contents(folder: StudyFolder) -> list[tuple[str, str, str]]:
+def _base64_png_figures(folder: StudyFolder) -> list[tuple[str, str, str]]:
     """Return (stem, file name, base64 content) of each PNG figure in the folder."""
     pictures = []
     for path in sorted(folder.path.glob("*.png"))[:_MOST_PICTURES]:
@@ -285,7 +289,7 @@ def _figure_contents(folder: StudyFolder) -> list[tuple[str, str, str]]:
     return pictures
 
 
-def _file_hashes(folder: StudyFolder) -> list[tuple[str, str]]:
+def _labelled_sha256_hashes(folder: StudyFolder) -> list[tuple[str, str]]:
     files = [folder.parts / f"{name}.parquet" for name in folder.part_names()[:_MOST_PARTS]]
     hashes = [(file.name, hashlib.sha256(read_regular_file(file)).hexdigest()) for file in files]
     return [("study, with all that fixes its results", folder.record.study_sha256), *hashes]

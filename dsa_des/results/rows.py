@@ -104,7 +104,9 @@ class StoredRows:
         return self._held[name]
 
     def _read_columns(self, names: Sequence[str], *, look: bool) -> None:
-        """Read named columns of all parts; with `look`, count statuses, keep first failed runs."""
+        """Read and keep named columns of all parts; with `look`, also count the statuses of all
+        runs and keep the first failed ones.
+        """
         while self._held and len(self._held) + len(names) > self._at_once:
             self._held.popitem(last=False)
         columns = None if look else [*names, "error"]
@@ -112,10 +114,10 @@ class StoredRows:
         for table in self._folder.each_part(self._before_round, columns):
             good = np.asarray(table["error"].is_null())
             if look:
-                self._note_run_outcomes(table, good)
+                self._note_statuses_and_failed_rows(table, good)
             kept = table if good.all() else table.filter(good)
             for name, result in pieces.items():
-                result.append(_dictionary_encode_texts(kept[name].combine_chunks()))
+                result.append(_to_numpy_or_encoded_texts(kept[name].combine_chunks()))
         if look:
             cell, replica = (_concatenate(pieces[name]) for name in _PLACE)
             self._count = len(cell)
@@ -125,7 +127,7 @@ class StoredRows:
             column = _concatenate(pieces.pop(name))
             self._held[name] = column if self._order is None else column[self._order]
 
-    def _note_run_outcomes(self, table: "pa.Table", good: BoolArray) -> None:
+    def _note_statuses_and_failed_rows(self, table: "pa.Table", good: BoolArray) -> None:
         self.status.update(table["status"].to_pylist())
         places = table.select(_PLACE).to_pydict()
         least = min(range(table.num_rows), key=lambda k: tuple(places[name][k] for name in _PLACE))
@@ -146,7 +148,7 @@ def _cell_and_replica(row: dict[str, Any]) -> tuple[int, int]:
     return row["cell"], row["replica"]
 
 
-def _dictionary_encode_texts(values: "pa.Array") -> Any:
+def _to_numpy_or_encoded_texts(values: "pa.Array") -> Any:
     """Return numbers as a NumPy array, and texts as a dictionary-encoded Arrow array."""
     import pyarrow as pa
 
@@ -167,7 +169,9 @@ def _concatenate(pieces: list[Any]) -> AnyArray:
 
 
 class Rows:
-    """A study's rows as columns, grouped into places (axis values) and independent units."""
+    """A study's rows as columns, grouped into places (combinations of axis values) and units
+    (replicas, or encounters, that are independent of each other).
+    """
 
     def __init__(self, stored: StoredRows, axes: Sequence[str], over: Sequence[str]) -> None:
         self.stored = stored
@@ -177,8 +181,8 @@ class Rows:
         self.axes = [name for name in axes if name not in over]
         self.over = list(over)
         #: What rows share that belong to the same place, and to the same independent unit.
-        self.places = self._code_rows(self.axes)
-        self.units = self._code_rows(self.over if self.over else ["replica"])
+        self.places = self._value_combination_codes(self.axes)
+        self.units = self._value_combination_codes(self.over if self.over else ["replica"])
 
     @cached_property
     def run_codes(self) -> IntArray:
@@ -191,8 +195,10 @@ class Rows:
         return self.stored.column(name)
 
     @cached_property
-    def stands_for(self) -> FloatArray | None:
-        """How many runs each row stands for in a sample, 0 if not flown; None if all are flown."""
+    def represented_run_counts(self) -> FloatArray | None:
+        """Weight of each row: how many runs it stands for where only a sample is flown, 0 if not
+        flown; None if all are.
+        """
         if STANDS_FOR not in self.stored.names:
             return None
         result = self.column(STANDS_FOR)
@@ -207,29 +213,33 @@ class Rows:
 
     def is_missing_unless_flown(self, name: str) -> bool:
         """Return whether runs that were not flown lack a value in this column."""
-        if self.stands_for is None:
+        if self.represented_run_counts is None:
             return False
-        values = self.column(name)[self.stands_for == 0.0]
+        values = self.column(name)[self.represented_run_counts == 0.0]
         return values.dtype != object and bool(np.isnan(values.astype(float)).any())
 
     def row(self, number: int) -> dict[str, Any]:
         """Return a row as column → value."""
-        return {name: _plain(self.column(name)[number]) for name in self.stored.names}
+        return {
+            name: _numpy_scalar_to_python(self.column(name)[number]) for name in self.stored.names
+        }
 
-    def _code_rows(self, names: Sequence[str]) -> IntArray:
+    def _value_combination_codes(self, names: Sequence[str]) -> IntArray:
         codes = np.zeros(len(self.stored), dtype=np.int64)
         for name in names:
             _, code = np.unique(self.column(name), return_inverse=True)
             codes = codes * (int(code.max(initial=0)) + 1) + code
         return codes
 
-    def each_place(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
-        """Yield (axis values, row indices) by combination of axis values, as they first occur."""
+    def row_indices_by_axis_values(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
+        """Yield (axis values, indices of the rows with them), combinations in order of first
+        row.
+        """
         order = np.argsort(self.places, kind="stable")
         _, starts = np.unique(self.places[order], return_index=True)
         groups = np.split(order, starts[1:]) if len(order) else []
         for rows in sorted(groups, key=lambda rows: int(rows[0])):
-            at = tuple(_plain(self.column(name)[rows[0]]) for name in self.axes)
+            at = tuple(_numpy_scalar_to_python(self.column(name)[rows[0]]) for name in self.axes)
             yield at, rows
 
     def comparisons_with_baseline(
@@ -240,7 +250,7 @@ class Rows:
         Its value of the axis, those of the others, the rows at the baseline and its own.
         """
         column = self.axes.index(axis)
-        places = dict(self.each_place())
+        places = dict(self.row_indices_by_axis_values())
         for at, rows in places.items():
             base = places.get((*at[:column], baseline, *at[column + 1 :]))
             if at[column] != baseline and base is not None:
@@ -289,9 +299,14 @@ class Rows:
     def _estimate_sampled_share(
         self, result: Result, rows: IntArray, confidence: float
     ) -> tuple[Estimate, int]:
-        """Return the share of runs with an event only flown ones know; how many lack a value."""
-        assert self.stands_for is not None
-        values, stands_for = self.column(result.name)[rows].astype(float), self.stands_for[rows]
+        """Return (share of runs with an event, rows without a value) where only a sample was
+        flown.
+        """
+        assert self.represented_run_counts is not None
+        values, stands_for = (
+            self.column(result.name)[rows].astype(float),
+            self.represented_run_counts[rows],
+        )
         known = ~np.isnan(values) | (stands_for == 0.0)
         ratio = share_from_flown_sample(
             np.ones(int(known.sum())), values[known], np.ones(int(known.sum())),
@@ -325,7 +340,9 @@ class Rows:
         return ratio, missing
 
     def _ratio_terms(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
-        """Return a ratio's columns over rows that have all, those rows, and how many lack one."""
+        """Return (columns of a ratio in rows that have all of them, those rows, number of
+        others).
+        """
         of = result.ratio
         assert of is not None
         if of.only is not None:
@@ -336,7 +353,9 @@ class Rows:
             weight = self.column(of.weight)[rows].astype(float)
         units = self.units[rows]
         cluster = units if of.cluster is None else self.column(of.cluster)[rows]
-        stands_for = None if self.stands_for is None else self.stands_for[rows]
+        stands_for = (
+            None if self.represented_run_counts is None else self.represented_run_counts[rows]
+        )
         flown = np.ones(len(rows), dtype=bool) if stands_for is None else stands_for > 0.0
         known = ~(np.isnan(below) | (flown & np.isnan(above)) | np.isnan(weight))
         if of.cluster is not None:
@@ -354,7 +373,7 @@ class Rows:
         _, here, there = np.intersect1d(runs[first], runs[second], return_indices=True)
         return first[here], second[there]
 
-    def paired_values(
+    def paired_means_by_unit(
         self, name: str, first: IntArray, second: IntArray
     ) -> tuple[IntArray, FloatArray, FloatArray]:
         """Return (units, values in `first`, values in `second`): unit means over common runs."""
@@ -369,7 +388,7 @@ class Rows:
         """Return a result's difference, `second` minus `first`, over runs that both have."""
         if result.kind == RATIO:
             return self._ratio_difference(result, first, second, confidence)
-        _, one, two = self.paired_values(result.name, first, second)
+        _, one, two = self.paired_means_by_unit(result.name, first, second)
         if result.quantile is not None:
             return quantile_difference(one, two, result.quantile, confidence)
         return estimate_difference(one, two, confidence, method, kind=result.kind)
@@ -387,12 +406,12 @@ class Rows:
         return ratio_difference(one.select_runs(here), two.select_runs(there), alone, confidence)
 
     def cut_off_counts(self, result: Result, rows: IntArray) -> tuple[tuple[str, int], ...]:
-        """Return sorted (where, number of rows) for the rows whose run cut the result off."""
+        """Return sorted (where in the run the result was cut off, number of such rows)."""
         if result.cut_off is None:
             return ()
         said = [where for where in self.column(result.cut_off)[rows].tolist() if where is not None]
         return tuple(sorted(Counter(said).items()))
 
 
-def _plain(value: Any) -> Any:
+def _numpy_scalar_to_python(value: Any) -> Any:
     return value.item() if hasattr(value, "item") else value

@@ -112,7 +112,9 @@ def estimate_share(successes: FloatArray, trials: FloatArray, confidence: float)
 
 
 def _has_few_units(successes: FloatArray, trials: FloatArray) -> bool:
-    """Return whether the interval has too few units: in all, or with a success, or a failure."""
+    """Return whether there are too few units for an interval: in all, with a success, or with a
+    failure.
+    """
     unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
     return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
 
@@ -206,7 +208,7 @@ def estimate_bounded_mean(values: FloatArray, confidence: float) -> Estimate:
     return Estimate(plain.value, low, high, plain.count, plain.few)
 
 
-def normal_estimate(
+def estimate_from_standard_error(
     value: float, error: float, count: int, few: bool, confidence: float
 ) -> Estimate:
     """Return an estimate with the normal interval of a given standard error."""
@@ -278,16 +280,17 @@ def chi_square_bounds(freedom: float, share: float = 0.95) -> tuple[float, float
     return low, high
 
 
-def unseen_event_moments(terms: FloatArray) -> tuple[float, float]:
-    """Return the mean and the mean square of one more event's term, drawn in proportion to the
-    terms: what it adds to a Poisson sum and its variance.
+def unseen_event_mean_and_square(terms: FloatArray) -> tuple[float, float]:
+    """Return (mean, mean square) of the term of one more event, drawn in proportion to the terms:
+    what it would add to a Poisson sum, and to its variance.
     """
     once = math.fsum(terms)
     return math.fsum(terms**2) / once, math.fsum(terms**3) / once
 
 
 def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed: int) -> FloatArray:
-    """Return sum `above` / sum `below` for bootstrap resamples of units, except without `below`.
+    """Return sum(above) / sum(below) of bootstrap resamples of units, without those where
+    sum(below) is 0.
 
     Units without any event are drawn together: they add nothing to either sum. Those that are
     alike in both sums are too, which leaves few kinds where weights repeat.
@@ -310,10 +313,11 @@ def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed:
     return np.concatenate(parts)
 
 
-def gamma_interval(
+def gamma_interval_of_ratio(
     below: FloatArray, above: FloatArray, ratio: float, tail: float
 ) -> tuple[float, float]:
-    """Return (low, high) of a ratio's interval; each end errs with probability `tail` at most.
+    """Return (low, high) of the interval of sum(above) / sum(below); each end errs with probability
+    `tail` at most.
 
     `below` and `above` are the clusters' terms below and above the line.
 
@@ -340,7 +344,7 @@ def gamma_interval(
     first = np.concatenate([np.zeros((5, 1)), np.cumsum(moments, axis=1)], axis=1)
     last = np.concatenate([np.cumsum(moments[:, ::-1], axis=1)[:, ::-1], np.zeros((5, 1))], axis=1)
 
-    def sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
+    def negative_and_positive_sums(limit: float) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return (sum, sum of squares) of the terms ``y - limit * x`` that are negative, with the
         sign turned, and of those that are positive.
         """
@@ -351,24 +355,24 @@ def gamma_interval(
             (stay[1] - limit * stay[0], limit**2 * stay[2] - 2.0 * limit * stay[3] + stay[4]),
         )
 
-    more, heaviest = unseen_event_moments(np.maximum(x, y)), float(x.max())
+    more, heaviest = unseen_event_mean_and_square(np.maximum(x, y)), float(x.max())
 
     def confidence_below(limit: float) -> float:
         """Return the confidence that the ratio is below `limit`."""
-        went, stay = sums(limit)
-        return _probability_of_more(went, (stay[0] + more[0], stay[1] + more[1]))
+        went, stay = negative_and_positive_sums(limit)
+        return _probability_gamma_exceeds(went, (stay[0] + more[0], stay[1] + more[1]))
 
     def confidence_above(limit: float) -> float:
-        went, stay = sums(limit)
+        went, stay = negative_and_positive_sums(limit)
         had = limit * heaviest
-        return _probability_of_more(stay, (went[0] + had, went[1] + had * had))
+        return _probability_gamma_exceeds(stay, (went[0] + had, went[1] + had * had))
 
     sure = 1.0 - tail
-    low = 0.0 if ratio == 0.0 else _bisect_ratio(confidence_above, sure, ratio, 0.5)
-    return low, _bisect_ratio(confidence_below, sure, ratio or 1.0 / len(x), 2.0)
+    low = 0.0 if ratio == 0.0 else _ratio_at_certainty(confidence_above, sure, ratio, 0.5)
+    return low, _ratio_at_certainty(confidence_below, sure, ratio or 1.0 / len(x), 2.0)
 
 
-def _probability_of_more(one: tuple[float, float], other: tuple[float, float]) -> float:
+def _probability_gamma_exceeds(one: tuple[float, float], other: tuple[float, float]) -> float:
     """Return the probability that gamma variable `one` exceeds `other`, each (mean, variance)."""
     from scipy.special import betainc
 
@@ -379,11 +383,11 @@ def _probability_of_more(one: tuple[float, float], other: tuple[float, float]) -
     return float(betainc(shapes[1], shapes[0], scales[0] / (scales[0] + scales[1])))
 
 
-def _bisect_ratio(
+def _ratio_at_certainty(
     certainty: Callable[[float], float], sure: float, start: float, factor: float
 ) -> float:
-    """Return the ratio at which `certainty` reaches `sure`: steps by `factor` away from `start`,
-    then bisection in the logarithm.
+    """Return the ratio at which `certainty` reaches `sure`, sought from `start` in steps of
+    `factor`; 0 or infinity if it never does.
     """
     inner = outer = start
     while certainty(outer) < sure:

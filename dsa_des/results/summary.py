@@ -45,7 +45,7 @@ def summarise(
 ) -> list[Line]:
     """Return lines with estimates of all summarised results per combination of axis values."""
     lines = []
-    for at, chosen in rows.each_place():
+    for at, chosen in rows.row_indices_by_axis_values():
         for result in results:
             if not result.is_summarised:
                 continue
@@ -101,15 +101,15 @@ def compare_axis(
             change = rows.difference(result, base, chosen, confidence, method)
             ratio = None
             if result.kind == EVENT:
-                ratio = _event_ratio(rows, result.name, base, chosen, weight, confidence)
+                ratio = _event_frequency_ratio(rows, result.name, base, chosen, weight, confidence)
             compared.append(Compared(others, value, baseline, result, change, ratio))
     return compared
 
 
-def _event_ratio(
+def _event_frequency_ratio(
     rows: Rows, name: str, first: IntArray, second: IntArray, weight: str | None, confidence: float
 ) -> PairedRatio:
-    """Return how often an event happens in some rows divided by others, over the same runs.
+    """Return an event's frequency in rows `second` over that in rows `first`, over runs of both.
 
     Rows `first` are below the line, `second` above; runs that only one has do not count. The
     result `weight` says how often each unit happens.
@@ -190,8 +190,10 @@ def one_sided_confidence(confidence: float) -> float:
     return 0.5 + confidence / 2.0
 
 
-def result_numbers_of_series(metric: str, names: Iterable[str]) -> dict[str, float]:
-    """Return the results ``METRIC.5``, ``METRIC.10`` ... with the number of each, ascending."""
+def numbers_by_series_result(metric: str, names: Iterable[str]) -> dict[str, float]:
+    """Return result name → its number, ascending, for the results ``METRIC.5``, ``METRIC.10``
+    ...
+    """
     numbers = {}
     for name in names:
         number = name.removeprefix(f"{metric}.")

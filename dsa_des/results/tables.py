@@ -75,7 +75,9 @@ class Tables:
         return expected
 
     def shown_lines(self, only: Sequence[str] = ()) -> list[Line]:
-        """Return summary lines of the named results, else those of figures or stop rule, or all."""
+        """Return summary lines of the named results; by default of those in figures and the stop
+        rule, or all if there are none.
+        """
         wanted = set(only) or {f.metric for f in self.record.figures if f.metric is not None}
         if self.record.stop_when is not None and not only:
             wanted.add(self.record.stop_when.metric)
@@ -139,7 +141,7 @@ class Tables:
             **_columns_at_paths(self.lines, expected="expected"),
         }  # fmt: skip
 
-    def other_axes_text(self, answer: Answer) -> str:
+    def other_axis_values_text(self, answer: Answer) -> str:
         """Return the values of the other axes: ``radar.scan_rate_hz = 1, radar.latency_s = 0``."""
         names = [name for name in self.rows.axes if name != answer.requirement.axis]
         return ", ".join(f"{n} = {short_text(v)}" for n, v in zip(names, answer.at, strict=True))
@@ -149,7 +151,7 @@ class Tables:
         return {
             "requirement": [item.requirement.text() for item in result],
             "axis": [item.requirement.axis for item in result],
-            "others": [self.other_axes_text(item) for item in result],
+            "others": [self.other_axis_values_text(item) for item in result],
             "cheapest": [None if item.value is None else short_text(item.value) for item in result],
             "confidence": [one_sided_confidence(self.record.confidence)] * len(result),
             "cheapest_by_estimate": [
@@ -180,7 +182,7 @@ class Tables:
             ),
         }  # fmt: skip
 
-    def notable_results(self, only: Sequence[str] = ()) -> list[str]:
+    def names_of_scatter_results(self, only: Sequence[str] = ()) -> list[str]:
         """Return the names of results to draw as scatters: those given, or else those in figures,
         or else those that differ from the baseline.
         """
@@ -210,10 +212,13 @@ def _axis_value_columns(axes: Sequence[str], items: Sequence[Any]) -> dict[str, 
 
 def _columns_at_paths(items: Sequence[Any], /, **paths: str) -> dict[str, list[Any]]:
     """Return column → value at a dotted attribute path in each item; None where a step is None."""
-    return {name: [_value_at(item, path) for item in items] for name, path in paths.items()}
+    return {
+        name: [_value_at_attribute_path(item, path) for item in items]
+        for name, path in paths.items()
+    }
 
 
-def _value_at(item: Any, path: str) -> Any:
+def _value_at_attribute_path(item: Any, path: str) -> Any:
     for part in path.split("."):
         if item is not None:
             item = item[int(part)] if part.isdecimal() else getattr(item, part)

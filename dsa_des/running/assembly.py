@@ -6,7 +6,12 @@ from fractions import Fraction
 from typing import Any
 
 from dsa_des.block.component import Component, Consumer, Context, Producer
-from dsa_des.block.foreign_calls import REFUSALS, describe_error, error_with_kind, is_stop_request
+from dsa_des.block.foreign_calls import (
+    REFUSALS,
+    describe_error,
+    error_text_with_type,
+    is_stop_request,
+)
 from dsa_des.errors import BlockFailure, Problem, RunRefused, SceneError, SetupFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.running.effects import Planned, WrapEffect, build_effects
@@ -59,7 +64,7 @@ class Assembly:
         for number in range(len(self._scenes)):
             self._pass_offers_downstream(number)
         #: What became of the effects of each stretch.
-        self.plans = self._plan_effects(wrap_effect)
+        self.plans = self._plan_and_build_effects(wrap_effect)
         self._set_up()
 
     def _build_stretch(self, number: int) -> None:
@@ -187,8 +192,8 @@ class Assembly:
         """Return the distinct instances of a block over all stretches, in order of time."""
         return list({id(of[name]): of[name] for of in self.stretches}.values())
 
-    def _plan_effects(self, wrap: WrapEffect | None) -> list[list[Planned]]:
-        """Decide the effects simulated in each stretch, build them in, and return the decisions."""
+    def _plan_and_build_effects(self, wrap: WrapEffect | None) -> list[list[Planned]]:
+        """Decide which effects are simulated in each stretch, build those, return all decisions."""
         planned: dict[int, list[Planned]] = {}
         problems: list[Problem] = []
         for component in (one for of in self.stretches for one in of.values()):
@@ -247,12 +252,12 @@ class Assembly:
         except (SceneError, BlockFailure, RunRefused):
             raise
         except REFUSALS as error:
-            problems.append(self._scene.setup_refusal(name, describe_error(error)))
+            problems.append(self._scene.problem_of_setup_refusal(name, describe_error(error)))
         except BaseException as error:
             if is_stop_request(error):
                 raise
             path = self._scene.blocks[name].cls.import_path()
-            raise SetupFailure(name, path, 0.0, None, error_with_kind(error)) from error
+            raise SetupFailure(name, path, 0.0, None, error_text_with_type(error)) from error
 
     def _call_method(self, component: Component, what: str, *arguments: Any) -> Any:
         """Call a block's method before the run and return its result; SceneError if it refuses."""

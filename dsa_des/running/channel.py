@@ -77,12 +77,13 @@ class Channel:
         """Start anew to record the first arrival tick of every message that is pushed."""
         self._pushed = []
 
-    def first_pushed_arrival(self) -> int | None:
+    def earliest_pushed_tick(self) -> int | None:
         """Return the earliest arrival tick pushed since recording began; None if there are none."""
         return min(self._pushed) if self._pushed else None
 
     def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
-        """Add a message and return (run, tick) of arriving rows in order; lost rows left out.
+        """Add a message; return (run, tick) at which its rows will arrive, in order, without lost
+        rows.
 
         `sent` is the tick at which it was sent, or each of its rows, when that is later than their
         own.
@@ -114,7 +115,7 @@ class Channel:
         return arrivals
 
     def drop_superseded_rows(self, tick: int) -> None:
-        """Drop waiting rows that newer ones replace before any reader at `tick` or later.
+        """Drop waiting rows that no reader at `tick` or later can see, as newer ones replace them.
 
         A slow sensor behind a fast one would otherwise let a message wait for each window between
         two of its scans. Where several runs go, a row is superseded in its own only.
@@ -142,7 +143,9 @@ class Channel:
         return min((int(arrivals.tick.min()) for arrivals, _ in self._waiting), default=MAX_TICK)
 
     def _count_or_mask_before(self, arrivals: RunTicks, end: int) -> int | BoolArray:
-        """Return how many rows arrive before `end` if they are the first, else a mask of them."""
+        """Return which rows arrive before `end`: their number if they come first, else a mask, True
+        for them.
+        """
         if len(self._runs.going) == 1:
             return arrivals.count_before_end(end)
         if end >= self._runs.run_ticks:
@@ -150,7 +153,7 @@ class Channel:
         due = arrivals.tick < end
         return len(arrivals) if due.all() else due
 
-    def collect(self, end: int) -> Rows | None:
+    def pop_arrived_rows(self, end: int) -> Rows | None:
         """Remove and return rows that arrive before `end`, in order of arrival; None if none do."""
         if not self._waiting:
             return None
@@ -180,7 +183,7 @@ class Channel:
                 break  # rows behind these arrive later still
         left.extend(self._waiting)
         self._waiting = left
-        collected = concatenate(taken)
+        collected = concatenate_rows(taken)
         if collected is not None and len(taken) > 1:
             collected = _sort_rows(collected)
         if collected is None or not self._runs.early:
@@ -188,22 +191,23 @@ class Channel:
         collected = _select_rows(*collected, self._runs.is_before_ends(collected[0]))
         return collected if len(collected[0]) else None
 
-    def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return the message rows that the input holds at instants (in order, before `end`).
+    def held_rows_at_instants(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
+        """Return (message, index of its row that the input holds at each instant); the instants are
+        in order and before `end`.
 
         With the message comes the row of it that is held at each instant, -1 when none has arrived.
         None: it holds nothing at all.
         """
-        new = self.collect(end)
+        new = self.pop_arrived_rows(end)
         if new is not None:
             rows = last_position_at_or_before(new[0], asked)
             if rows[0] >= 0 and (len(rows) == 1 or bool((rows >= 0).all())):
                 # What was before need not be looked up.
                 self._keep_as_held(new, end)
                 return new[1], rows
-        before = concatenate(self._passed)
+        before = concatenate_rows(self._passed)
         parts = [] if before is None else [_last_of_each_run(*_sort_rows(before))]
-        held = concatenate(parts if new is None else [*parts, new])
+        held = concatenate_rows(parts if new is None else [*parts, new])
         if held is None:
             return None
         held = _sort_rows(held)
@@ -213,7 +217,9 @@ class Channel:
         return held[1], last_position_at_or_before(held[0], asked)
 
     def _keep_as_held(self, new: Rows, end: int) -> None:
-        """Keep collected rows as held, and drop older ones replaced in every run that goes on."""
+        """Keep collected rows as held; drop older ones where each run being simulated has a new
+        one.
+        """
         if self._runs.count == 1:
             self._passed = [new]
             return
@@ -225,7 +231,7 @@ class Channel:
             self._keep_last_rows(end)
 
     def _has_all_runs(self, arrivals: RunTicks) -> bool:
-        """Return whether the arrivals include every run that goes on."""
+        """Return whether the arrivals include every run that is being simulated."""
         runs = self._runs.going
         if len(runs) == 1:
             return True
@@ -239,11 +245,11 @@ class Channel:
         return len(reached) == len(runs)
 
     def _keep_last_rows(self, end: int) -> None:
-        """Reduce the held rows to the last collected one of each run that goes on."""
+        """Reduce the held rows to the last collected one of each run that is being simulated."""
         runs = self._runs.going
         first = runs.stop if end >= self._runs.run_ticks else runs.start
         going = [part for part in self._passed if part[0].run[-1] >= first]
-        held = concatenate(going)
+        held = concatenate_rows(going)
         self._passed = [] if held is None else [_last_of_each_run(*_sort_rows(held))]
 
 
@@ -271,7 +277,7 @@ def _sort_rows(rows: Rows) -> Rows:
     return rows if order is None else (rows[0].take(order), rows[1].take(order))
 
 
-def concatenate(parts: Sequence[Rows]) -> Rows | None:
+def concatenate_rows(parts: Sequence[Rows]) -> Rows | None:
     """Return arrivals and rows of all parts joined in the order given; None if there are none."""
     if not parts:
         return None
@@ -287,10 +293,12 @@ class WireEnd(Protocol):
 
     source: str
 
-    def sample(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return the message rows that the input holds at each instant, all before `end`."""
+    def held_rows_at_instants(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
+        """Return (message, index of its row that the input holds at each instant, -1 for none);
+        None if it holds nothing.
+        """
 
-    def collect(self, end: int) -> Rows | None:
+    def pop_arrived_rows(self, end: int) -> Rows | None:
         """Remove and return the rows that arrive before `end`; None if there are none."""
 
 
@@ -330,10 +338,10 @@ class Inputs:
         held: dict[str, tuple[Message, IntArray]] = {}
         missing: np.ndarray | None = None
         for port, wire, required in self._held:
-            sample = wire.sample(asked, end)
+            sample = wire.held_rows_at_instants(asked, end)
             if sample is not None:
                 held[port] = sample
-            if required and complete and _has_missing(sample):
+            if required and complete and _lacks_row_at_some_instant(sample):
                 absent = np.ones(len(asked), bool) if sample is None else sample[1] < 0
                 missing = absent if missing is None else missing | absent
         if missing is not None:  # before the first messages
@@ -345,7 +353,7 @@ class Inputs:
             held = {port: (message, rows[there]) for port, (message, rows) in held.items()}
         arrived: dict[str, list[Arrivals]] = {}
         for port, wire in self._queued:
-            new = wire.collect(end)
+            new = wire.pop_arrived_rows(end)
             if new is not None:
                 arrived.setdefault(port, []).append(Arrivals(wire.source, *new))
         rows = None if demand is None else partial(demand, asked)
@@ -353,7 +361,7 @@ class Inputs:
         return Wake(asked, scans, per_s, held, arrived, rows, first, clock, idle)
 
 
-def _has_missing(sample: tuple[Message, IntArray] | None) -> bool:
+def _lacks_row_at_some_instant(sample: tuple[Message, IntArray] | None) -> bool:
     if sample is None:
         return True
     rows = sample[1]

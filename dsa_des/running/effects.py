@@ -14,10 +14,10 @@ from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.arrays.types import BoolArray, FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.block.effect import Effect, Verdict
-from dsa_des.errors import shown_value
+from dsa_des.errors import shortened_repr
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.wiring import Wire
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import ticks_to_nanoseconds
 from dsa_des.time.randomness import Stream
 
 
@@ -54,7 +54,7 @@ def plan_effects(
     `everything`, all are built that can be parametrised neutrally.
     """
     verdicts = [(effect, effect.verdict(block)) for effect in type(block).effects]
-    allowed = {} if everything else _omitted_within_tolerance(verdicts, tolerance)
+    allowed = {} if everything else _omission_reasons_by_effect(verdicts, tolerance)
     planned = []
     for effect, verdict in verdicts:
         built, because = verdict.simulated, verdict.because
@@ -93,7 +93,7 @@ def _build_effect(block: Component, effect: Effect[Any]) -> Any:
             what = "something to call" if hook.builds_callable else "a value"
             raise ValueError(
                 f"effect {effect.name!r} of {type(block).import_path()} builds "
-                f"{shown_value(value)}: "
+                f"{shortened_repr(value)}: "
                 f"{hook} needs {what}, {hook.signature_text()}"
             )
     return value
@@ -102,7 +102,7 @@ def _build_effect(block: Component, effect: Effect[Any]) -> Any:
 def remaining_tolerance(
     planned: Sequence[Planned], tolerance: Mapping[str, float]
 ) -> dict[str, float]:
-    """Return what is left of a tolerance after the bounds of all effects that were left out."""
+    """Return quantity → tolerance left after the error bounds of all effects that are left out."""
     left = dict(tolerance)
     for item in planned:
         if item.verdict.simulated and not item.built:
@@ -111,10 +111,12 @@ def remaining_tolerance(
     return left
 
 
-def _omitted_within_tolerance(
+def _omission_reasons_by_effect(
     verdicts: Sequence[tuple[Effect, Verdict]], tolerance: Mapping[str, float]
 ) -> dict[str, str]:
-    """Return left-out effect name → reason: their bounds together stay within the tolerance."""
+    """Return effect name → reason, for effects left out as their error bounds together stay within
+    the tolerance.
+    """
     left = dict(tolerance)
     allowed: dict[str, str] = {}
     bounded = [
@@ -191,11 +193,13 @@ def plan_timing_effects(scene: Scene, *, everything: bool = False) -> list[Plann
     planned: list[Planned] = []
     for effects, places in ((OF_BLOCKS, blocks), (OF_WIRES, wires), (OF_CLOCKS, clocks)):
         for effect in effects:
-            planned += _plan_key(effect, places, everything)
+            planned += _plan_effect_of_key(effect, places, everything)
     return planned
 
 
-def _plan_key(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -> Iterator[Planned]:
+def _plan_effect_of_key(
+    effect: _OfKey, places: list[tuple[str, Any]], everything: bool
+) -> Iterator[Planned]:
     verdicts = [(place, effect.verdict(thing)) for place, thing in places]
     for place, verdict in verdicts:
         if verdict.simulated:
@@ -213,7 +217,7 @@ def _plan_key(effect: _OfKey, places: list[tuple[str, Any]], everything: bool) -
     yield Planned(place, effect, rest[0], built, because)
 
 
-def may_lose_or_delay(wire: Wire, everything: bool) -> bool:
+def has_simulated_loss_or_jitter(wire: Wire, everything: bool) -> bool:
     """Return whether loss or jitter is simulated for the messages of a wire."""
     return everything or LOSS.verdict(wire).simulated or WIRE_JITTER.verdict(wire).simulated
 
@@ -253,5 +257,5 @@ class WireFaults:
         return of
 
     def _draw_uniform(self, stream: Stream, sent: RunTicks) -> FloatArray:
-        instant = nanosecond_of(sent.tick, self.ticks_per_s)
+        instant = ticks_to_nanoseconds(sent.tick, self.ticks_per_s)
         return stream.of_runs(sent.run, instant).uniform(instant.astype(np.uint64), 0)

@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 import simpy
 
-from dsa_des.arrays.run_ticks import RunTicks, single_run_numbers
+from dsa_des.arrays.run_ticks import RunTicks, shared_zero_run_numbers
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.wake import Wake
 from dsa_des.record.recording import Recorder
@@ -72,7 +72,9 @@ class RunState(Protocol):
 
 
 class OwnProcess(Protocol):
-    """Interface through which a block with a SimPy process of its own is run."""
+    """What a `BlockEnvironment` needs of the node that runs its block: priority, arrivals, inputs
+    and sending.
+    """
 
     simulation: RunState
 
@@ -139,7 +141,7 @@ class BlockEnvironment:
 
         It sets out later, where `leaves` is a later tick: before any block runs then.
         """
-        self._node.send(result, RunTicks(single_run_numbers(1), self.tick_array()), leaves)
+        self._node.send(result, RunTicks(shared_zero_run_numbers(1), self.tick_array()), leaves)
 
     def tick_array(self) -> np.ndarray:
         """Return the current tick as the ``tick`` of a one-row message."""

@@ -17,7 +17,12 @@ from dsa_des.running.loops import (
     shortest_delay_s,
 )
 from dsa_des.running.node import Node
-from dsa_des.scene.graph import add_queue_nodes, loop_number_by_block, queue_node_name, window_order
+from dsa_des.scene.graph import (
+    graph_with_queue_nodes,
+    loop_number_by_block,
+    queue_node_name,
+    window_order,
+)
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
 from dsa_des.scene.scene import Scene
 from dsa_des.time.run_clock import RunClock
@@ -38,7 +43,9 @@ def _blocks_without_windows(scene: Scene) -> dict[str, str]:
 
 
 def _explain_fast_feedback(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
-    """Return block → reason, for blocks that feed back over loops sooner than the next scan."""
+    """Return block → reason, for blocks in loops whose feedback arrives sooner than the next
+    scan.
+    """
     stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
     per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
@@ -51,7 +58,7 @@ def _explain_fast_feedback(scene: Scene, opened: Collection[Edge]) -> dict[str, 
 
 
 def windowed_blocks(scene: Scene, queues: Collection[str]) -> set[str]:
-    """Return the blocks that may run in look-ahead windows, outside of loops.
+    """Return the blocks outside of loops that may handle a whole look-ahead window in one go.
 
     A block runs at the widest grain that it and everything upstream allow: it must declare
     itself windowed, have no process of its own, queue for no shared processor but those in
@@ -74,13 +81,13 @@ def windowed_queues(scene: Scene) -> set[str]:
     Their blocks must run in look-ahead windows, and none of them may wait for what comes out of
     the queue, through whichever blocks or other queues.
     """
-    queues = scene.queues
+    queues = scene.blocks_by_shared_processor
     # Who leaves out scans must know of each whether the processor is busy.
     policies = {name: find_policy(p.when_busy) for name, p in scene.processors.items()}
     able = {name for name, policy in policies.items() if policy.skips is QueuePolicy.skips}
     while able:
         looped = loop_number_by_block(
-            add_queue_nodes(scene.graph, {name: queues[name] for name in able})
+            graph_with_queue_nodes(scene.graph, {name: queues[name] for name in able})
         )
         windowed = windowed_blocks(scene, able)
         left = {
@@ -121,7 +128,7 @@ class Grain:
     queues: dict[str, list[str]] = field(default_factory=dict)
     ahead: set[str] = field(default_factory=set)
 
-    def order(self, scene: Scene, first: Collection[str] = ()) -> dict[str, int]:
+    def window_handling_order(self, scene: Scene, first: Collection[str] = ()) -> dict[str, int]:
         """Return block or queue → its place in order of handling a window (`window_order`)."""
         return window_order(scene.graph, self.windowed, self.cut_edges, self.queues, first)
 
@@ -149,22 +156,26 @@ def choose_grain(scene: Scene, window: int | None) -> Grain:
         slow = slow or _explain_fast_feedback(scene, opened)
         if not slow:
             return Grain(every, False, opened, {}, ahead=set() if ending else ahead)
-    queues = {name: scene.queues[name] for name in sorted(windowed_queues(scene))}
+    queues = {
+        name: scene.blocks_by_shared_processor[name] for name in sorted(windowed_queues(scene))
+    }
     windowed = windowed_blocks(scene, queues)
     return Grain(
         windowed, False, set(), slow or _blocks_that_prevent_windows(scene, windowed), queues
     )
 
 
-def blocks_held_back(scene: Scene, windowed: Collection[str]) -> list[str]:
+def blocks_held_back_from_windows(scene: Scene, windowed: Collection[str]) -> list[str]:
     """Return, sorted, the blocks that could run in windows but do not because of other blocks."""
     classes = scene.classes
     return sorted(n for n in scene.blocks if _can_take_windows(classes[n]) and n not in windowed)
 
 
 def _blocks_that_prevent_windows(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
-    """Return block → reason, for blocks without windows, which make later ones go scan by scan."""
-    kept = set(blocks_held_back(scene, windowed))
+    """Return block → reason, for blocks that run scan by scan and force those fed by them to do
+    so.
+    """
+    kept = set(blocks_held_back_from_windows(scene, windowed))
     return {
         name: why
         for name, why in _blocks_without_windows(scene).items()
@@ -197,7 +208,7 @@ def refuse_endless_work(scene: Scene, scans: float, duration_s: float) -> None:
         raise SceneError([scene.problem("duration_s", message)])
 
 
-def longest_window_ticks(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
+def window_length_ticks(nodes: Mapping[str, Node], runs: Runs, window: int | None) -> int:
     """Return the length of a window, in ticks, that holds about the wanted number of scans.
 
     `window` are scans of all clocks together; by default, and where blocks run scan by scan anyway,

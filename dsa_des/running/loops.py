@@ -78,7 +78,9 @@ def shortest_delay_s(scene: Scene, edge: Edge) -> Fraction:
 
 
 def _scan_period_s(scene: Scene, edge: Edge) -> Fraction:
-    """Return the scan period, s, counting an edge's delays: receiver's, else sender's, else 0."""
+    """Return the scan period, s, in which an edge's delay counts: the receiver's, else the
+    sender's, else 0.
+    """
     for name in reversed(edge):
         block = scene.blocks[name]
         spec = block.cls.clock_of(block.parameters)
@@ -95,11 +97,11 @@ def offer_order(graph: nx.DiGraph, classes: Mapping[str, type[Component]]) -> di
     without, and else at a delay.
     """
 
-    def of_source(edge: Edge) -> bool:
+    def leads_into_source(edge: Edge) -> bool:
         return not any(port.required for port in classes[edge[1]].inputs.values())
 
     opened = nx.DiGraph(graph)
-    for opens in (of_source, lambda edge: _is_optional_edge(graph, classes, edge)):
+    for opens in (leads_into_source, lambda edge: _is_optional_edge(graph, classes, edge)):
         if not (looped := loop_number_by_block(opened)):
             break
         inside = [e for e in opened.edges if looped.get(e[0], -1) == looped.get(e[1], -2)]

@@ -16,7 +16,7 @@ from dsa_des.arrays.run_ticks import (
     RunTicks,
     last_position_at_or_before,
     positions_with_found_mask,
-    single_run_numbers,
+    shared_zero_run_numbers,
     union_of_instants,
 )
 from dsa_des.arrays.types import BoolArray, IntArray
@@ -112,9 +112,9 @@ class Node:
         env = self.simulation.env
         self._bell = Bell(env)
         own = self.component.process
-        env.process(self._loop() if own is None else self._own_process(own))
+        env.process(self._run_at_each_bell() if own is None else self._own_process(own))
 
-    def _loop(self) -> Generator[simpy.Event, None, None]:
+    def _run_at_each_bell(self) -> Generator[simpy.Event, None, None]:
         while True:
             yield self._bell
             self._bell = Bell(self.simulation.env)
@@ -138,7 +138,9 @@ class Node:
             self.simulation.fail(self, ticks, error)
 
     def failure_counts(self) -> Mapping[str, IntArray]:
-        """Return failure → counts (2, runs): runs in which it never ran, outages; empty if none."""
+        """Return kind of failure → (failures, cases) by run, (2, runs): that it never ran, or
+        outages.
+        """
         out = {} if self.outages is None else self.outages.failure_counts()
         if self.component.process is not None or self._all_ran:
             return out
@@ -178,17 +180,17 @@ class Node:
 
     # -- when ----------------------------------------------------------------------------------
 
-    def open_window(self, window: Window) -> None:
+    def schedule_block_in_window(self, window: Window) -> None:
         """Schedule all that the block's clock calls for in a window."""
         start, end = window.start, window.end
         if self.processor is not None:
-            self.processor.open_window(start, end)
+            self.processor.schedule_service_of_window(start, end)
         if self.windowed:
             if self._window_end(window) > start:
                 self.schedule_at(start)
             return
         if self.clock is not None:
-            scans, instants = self.clock.between(start, end)
+            scans, instants = self.clock.scans_between(start, end)
             self._scan_at = dict(zip(instants.tick.tolist(), scans.tolist(), strict=True))
             for tick in self._scan_at:
                 self.schedule_at(tick)
@@ -196,10 +198,10 @@ class Node:
             for tick in self._demanded_instants(start, end).tick.tolist():
                 self.schedule_at(tick)
         if self.pulse is not None:
-            for tick in self.pulse.between(start, end)[1].tick.tolist():
+            for tick in self.pulse.scans_between(start, end)[1].tick.tolist():
                 self.schedule_at(tick)
 
-    def next_run_bound(self, start: int, ahead: int) -> int:
+    def lower_bound_of_next_run(self, start: int, ahead: int) -> int:
         """Return a tick, `start` or later, before which a block run in windows does not run.
 
         It has come up to `ahead` if it runs ahead.
@@ -210,16 +212,18 @@ class Node:
             clocks += [(demand.clock, demand.lead_ticks) for demand in self.demands]
         if self.pulse is not None:
             clocks.append((self.pulse, 0))
-        ticks = [clock.next_scan_bound(start + lead) - lead for clock, lead in clocks]
+        ticks = [clock.lower_bound_of_next_scan(start + lead) - lead for clock, lead in clocks]
         ticks += [wire.earliest_waiting_tick() for wire in self._trigger_wires]
         return max(start, min(ticks, default=MAX_TICK))
 
     def _window_end(self, window: Window) -> int:
-        """Return the tick that ends the block's window; later for blocks ahead of all loops."""
+        """Return the tick that ends the block's window; later than the window's end for blocks that
+        run ahead of all loops.
+        """
         return window.ahead if self.ahead else window.end
 
     def _demanded_instants(self, start: int, end: int) -> RunTicks:
-        return _concatenate([demand.instants_between(start, end) for demand in self.demands])
+        return _union_of_instants([demand.instants_between(start, end) for demand in self.demands])
 
     # -- what ----------------------------------------------------------------------------------
 
@@ -236,35 +240,35 @@ class Node:
         waiting = idle is not None and bool(idle[0])
         if not waiting and self.processor is not None and self.processor.skip_if_busy(self.name):
             for wire in self._trigger_wires:
-                wire.collect(tick + 1)  # what came to be worked on now is left out with it
+                wire.pop_arrived_rows(tick + 1)  # what came to be worked on now is left out with it
             return
         self._run(_single_instant(tick), np.array([scan], dtype=np.int64), tick + 1, idle)
 
     def _run_window(self, start: int, end: int) -> None:
         if self.clock is not None:
-            scans, instants = self.clock.between(start, end)
+            scans, instants = self.clock.scans_between(start, end)
         else:
             instants = self._demanded_instants(start, end) if self.on_demand else RunTicks.empty()
-            scans = _no_scan_numbers(len(instants))
+            scans = _placeholder_scan_numbers(len(instants))
         arrivals = [wire.arrivals_before(end) for wire in self._trigger_wires]
         if any(len(part.tick) for part in arrivals):
             own, numbers = instants, scans
-            instants = _concatenate([own, *arrivals])
-            scans = _no_scan_numbers(len(instants))
+            instants = _union_of_instants([own, *arrivals])
+            scans = _placeholder_scan_numbers(len(instants))
             if len(own) and self.clock is not None:
                 scans = scans.copy()
                 scans[last_position_at_or_before(instants, own)] = numbers
         idle = None
-        if self.pulse is not None and len(pulses := self.pulse.between(start, end)[1]):
+        if self.pulse is not None and len(pulses := self.pulse.scans_between(start, end)[1]):
             busy = instants
-            instants = _concatenate([busy, pulses])
+            instants = _union_of_instants([busy, pulses])
             idle = np.ones(len(instants), dtype=bool)
             if len(busy):
                 rows = last_position_at_or_before(instants, busy)
                 scans, numbers = np.full(len(instants), -1), scans
                 scans[rows], idle[rows] = numbers, False
             else:
-                scans = _no_scan_numbers(len(instants))
+                scans = _placeholder_scan_numbers(len(instants))
         runs = self.simulation.runs
         if runs.early:
             kept = runs.is_before_ends(instants)
@@ -288,7 +292,7 @@ class Node:
             if not len(instants):
                 return
         wake = self._inputs.make_wake(
-            instants, scans, end, self._rows_demanded_by_block, clock=before, idle=idle
+            instants, scans, end, self._row_indices_by_demanding_block, clock=before, idle=idle
         )
         if wake is None:
             return
@@ -313,7 +317,7 @@ class Node:
                 raise
             self.simulation.fail(self, ticks, error, int(wake.scans[0]))
 
-    def _rows_demanded_by_block(self, instants: RunTicks) -> Mapping[str, IntArray]:
+    def _row_indices_by_demanding_block(self, instants: RunTicks) -> Mapping[str, IntArray]:
         if not self.demands or self.clock is not None:
             return {}
         start, end = int(instants.tick[0]), int(instants.tick[-1]) + 1
@@ -374,7 +378,7 @@ class Node:
                     node.schedule_at(arrival)
 
 
-def _concatenate(parts: Sequence[RunTicks]) -> RunTicks:
+def _union_of_instants(parts: Sequence[RunTicks]) -> RunTicks:
     """Return the union of the (run, tick) instants of all parts, in order."""
     filled = [part for part in parts if len(part.tick)]
     if len(filled) > 1:
@@ -386,9 +390,9 @@ def _concatenate(parts: Sequence[RunTicks]) -> RunTicks:
 _NO_SCAN = np.broadcast_to(np.int64(-1), 1 << 40)
 
 
-def _no_scan_numbers(rows: int) -> IntArray:
+def _placeholder_scan_numbers(rows: int) -> IntArray:
     return _NO_SCAN[:rows]
 
 
 def _single_instant(tick: int) -> RunTicks:
-    return RunTicks(single_run_numbers(1), np.array([tick], dtype=np.int64))
+    return RunTicks(shared_zero_run_numbers(1), np.array([tick], dtype=np.int64))

@@ -34,7 +34,7 @@ def build_nodes(
     scene, components = timeline.scene, stretches[0]
     # Who ends runs comes before all that it does not depend on: that is not run beyond the end.
     ending = [name for name, block in components.items() if may_end_its_run(type(block))]
-    depth, order = block_depths(scene.graph, ending), grain.order(scene, ending)
+    depth, order = block_depths(scene.graph, ending), grain.window_handling_order(scene, ending)
     shuffle = None if shuffle_ties is None else random.Random(shuffle_ties)
     nodes = {}
     for number, (name, component) in enumerate(sorted(components.items())):
@@ -43,7 +43,7 @@ def build_nodes(
         by_name = base + number / (len(components) + 1)
         node = Node(run, component, windowed, _make_priority(base, by_name, shuffle))
         node.runner = timeline.runner(component)
-        node.stretched = timeline.stretched([of[name] for of in stretches])
+        node.stretched = timeline.block_switching_by_stretch([of[name] for of in stretches])
         node.clock = timeline.clock(name, component)
         node.pulse = timeline.periodic_wake_clock(component)
         node.processor = processors.get(scene.blocks[name].options.processor or "")
@@ -66,14 +66,14 @@ def build_processors(
     """
     scene = timeline.scene
     streams = Streams(scene.seed)
-    order = grain.order(scene)
+    order = grain.window_handling_order(scene)
     ticks_per_s = scene.ticks_per_s
     processors: dict[str, Processor] = {}
     for name, p in scene.processors.items():
         try:
             of_stretches = [p, *(one.scene.processors[name] for one in scene.stretches)]
             draws = streams.stream(name, "service time")
-            service = Service(name, of_stretches, timeline.from_ticks, ticks_per_s, draws)
+            service = Service(name, of_stretches, timeline.stretch_start_ticks, ticks_per_s, draws)
         except ValueError as error:
             raise SceneError([scene.problem("processors", str(error))]) from error
         at_once = WINDOW_PRIORITY + order[queue_node_name(name)] if name in grain.queues else None
@@ -98,7 +98,7 @@ def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -
     of_stretches = [scene.wires, *(stretch.scene.wires for stretch in scene.stretches)]
     for wires in zip(*of_stretches, strict=True):
         wire = wires[0]
-        channel = timeline.channel(wires, _scan_delay(scene, wire, nodes))
+        channel = timeline.channel_of_wire(wires, _scan_delay_ticks(scene, wire, nodes))
         if isinstance(wire.holds, dict):
             declared = nodes[wire.target].component.inputs[wire.input].message
             channel.set_held_message(declared.make_initial(wire.holds), 0)
@@ -120,13 +120,13 @@ def connect_nodes(scene: Scene, nodes: Mapping[str, Node], timeline: Timeline) -
             )
             raise SceneError([scene.problem("changes", message)])
     for name, node in nodes.items():
-        node.demands = find_demands(nodes, name)
+        node.demands = demands_of_clocks_downstream(nodes, name)
         if node.on_demand and not node.demands:
             message = "runs when blocks downstream scan, and none of them has a scan clock"
             raise SceneError([scene.problem(f"blocks.{name}", message)])
 
 
-def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
+def demands_of_clocks_downstream(nodes: Mapping[str, Node], name: str) -> list[Demand]:
     """Return the nearest blocks with scan clocks on each path downstream, and the delay to each.
 
     What comes back to it around a loop asks nothing new of it: each turn would, one delay earlier.
@@ -149,9 +149,11 @@ def find_demands(nodes: Mapping[str, Node], name: str) -> list[Demand]:
 
 
 def _carries_demanded_rows(nodes: Mapping[str, Node], wire: Wire) -> bool:
-    """Return whether rows that a scan downstream demands of an on-demand block come over a wire."""
+    """Return whether a wire carries rows of an on-demand block that a scan clock downstream
+    needs.
+    """
     target, todo, seen = nodes[wire.target], [wire.source], {wire.source}
-    if target.clock is None and not find_demands(nodes, wire.target):
+    if target.clock is None and not demands_of_clocks_downstream(nodes, wire.target):
         return False
     while todo:
         node = nodes[todo.pop()]
@@ -188,7 +190,7 @@ def check_latest_arrival_fits(scene: Scene, nodes: Mapping[str, Node], run_ticks
         raise SceneError([scene.problem("duration_s", message)])
 
 
-def _scan_delay(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
+def _scan_delay_ticks(scene: Scene, wire: Wire, nodes: Mapping[str, Node]) -> int:
     if not wire.delay_scans:
         return 0
     clock = nodes[wire.target].clock or nodes[wire.source].clock

@@ -25,7 +25,7 @@ from dsa_des.block.message import PER_ROW, STATIC, Message, Text, column
 from dsa_des.running.events import WakeUp
 from dsa_des.scene.block_table import ProcessorParameters
 from dsa_des.scene.queue_policy import QueuePolicy, find_policy
-from dsa_des.time.clock import nanosecond_of
+from dsa_des.time.clock import ticks_to_nanoseconds
 from dsa_des.time.randomness import Stream, key_of
 
 # Messages are done before, and enter after, every block of an instant.
@@ -94,7 +94,7 @@ class Service:
         least: IntArray = self._least[of]
         if not self._spread.any():
             return least
-        pairs = zip(blocks, nanosecond_of(entered, self._ticks_per_s).tolist(), strict=True)
+        pairs = zip(blocks, ticks_to_nanoseconds(entered, self._ticks_per_s).tolist(), strict=True)
         keys = np.array([key_of("job", block, tick) for block, tick in pairs], dtype=np.uint64)
         extra = np.rint(self._stream.uniform(keys, 0) * self._spread[of])
         return least + extra.astype(np.int64)
@@ -118,7 +118,7 @@ class _Entry:
         done = np.full(len(first), _NEVER, dtype=np.int64)
         return cls(block, message, deliver, np.append(first, len(message)), done)
 
-    def send(self) -> None:
+    def deliver_finished_rows(self) -> None:
         """Deliver, once, the rows of the jobs whose end is known."""
         if len(known := np.flatnonzero(self.done < _NEVER)) == 0:
             return
@@ -175,9 +175,10 @@ class Processor:
         self._line: deque[_Job] = deque()
         self._working: _Job | None = None
         self._free_from = 0
-        #: What became of jobs since `close_window`: block, and the numbers of `_record_all`.
+        #: What became of jobs since `record_job_outcomes`: block, and the numbers of
+        # `_record_processing_rows`.
         self._notes: list[tuple[str, tuple[int, ...]]] = []
-        #: Entries of which something leaves, since `_send_done`.
+        #: Entries of which something leaves, since `_deliver_finished_messages`.
         self._leaving: dict[_Entry, None] = {}
         #: In closed form, jobs that are done after the last window: entered, started, done, block.
         self._under_way = (*[np.empty(0, dtype=np.int64)] * 3, np.empty(0, dtype=object))
@@ -190,7 +191,7 @@ class Processor:
         self._note_outcome(_Job(block, now), now, SKIPPED)
         return True
 
-    def open_window(self, start: int, end: int) -> None:
+    def schedule_service_of_window(self, start: int, end: int) -> None:
         """Schedule the messages of [start, end) to be served after all blocks have sent theirs."""
         if self._window_priority is None or self._window == (start, end):
             return  # each of its blocks says so
@@ -204,27 +205,27 @@ class Processor:
             WakeUp(self._env, 0, ENTRY_PRIORITY).callbacks.append(self._serve_instant)
         self._entries.append(_Entry.from_message(block, message, deliver))
 
-    def _take_entries(self) -> list[_Entry]:
+    def _pop_entries_sorted_by_block(self) -> list[_Entry]:
         entries, self._entries = self._entries, []
         return sorted(entries, key=lambda entry: entry.block)
 
     # -- at an instant -------------------------------------------------------------------------
 
     def _serve_instant(self, event: simpy.Event) -> None:
-        entries, now = self._take_entries(), int(self._env.now)
+        entries, now = self._pop_entries_sorted_by_block(), int(self._env.now)
         ticks = np.full(len(entries), now, dtype=np.int64)
         services = self._service.service_ticks([entry.block for entry in entries], ticks).tolist()
         jobs = zip(entries, services, strict=True)
-        self._enter(now, [_Job(entry.block, now, service, entry) for entry, service in jobs])
-        self._send_done()
+        self._enqueue_jobs(now, [_Job(entry.block, now, service, entry) for entry, service in jobs])
+        self._deliver_finished_messages()
 
     def _on_job_done(self, event: simpy.Event) -> None:
         self._finish_jobs_until(int(self._env.now))
-        self._send_done()
+        self._deliver_finished_messages()
 
     # -- the line ------------------------------------------------------------------------------
 
-    def _enter(self, now: int, jobs: Iterable[_Job]) -> None:
+    def _enqueue_jobs(self, now: int, jobs: Iterable[_Job]) -> None:
         for job in jobs:
             if self._policy.skips(self._working is not None or bool(self._line)):
                 self._note_outcome(job, now, SKIPPED)  # another block of this instant was first
@@ -237,9 +238,9 @@ class Processor:
             if job not in gone:
                 self._line.append(job)
         if self._working is None:
-            self._begin(now)
+            self._start_next_job(now)
 
-    def _begin(self, now: int) -> None:
+    def _start_next_job(self, now: int) -> None:
         if not self._line:
             return
         self._working = job = self._line.popleft()
@@ -254,25 +255,27 @@ class Processor:
         while self._working is not None and self._free_from <= until:
             job, now, self._working = self._working, self._free_from, None
             self._note_outcome(job, now, DONE)
-            self._begin(now)
+            self._start_next_job(now)
 
     def _note_outcome(self, job: _Job, tick: int, outcome: int) -> None:
         numbers = (tick, job.entered, job.started, len(self._line), outcome)
         self._notes.append((job.block, numbers))
 
-    def close_window(self) -> None:
+    def record_job_outcomes(self) -> None:
         """Record the outcomes of jobs since the last call: when each entered, started and ended."""
         if notes := self._notes:
             self._notes = []
-            self._record_all([block for block, _ in notes], *np.array([n for _, n in notes]).T)
+            self._record_processing_rows(
+                [block for block, _ in notes], *np.array([n for _, n in notes]).T
+            )
 
-    def _send_done(self) -> None:
+    def _deliver_finished_messages(self) -> None:
         """Deliver the messages of jobs whose end is now known."""
         leaving, self._leaving = self._leaving, {}
         for entry in leaving:
-            entry.send()
+            entry.deliver_finished_rows()
 
-    def _record_all(self, blocks: Iterable[str], *columns: IntArray) -> None:
+    def _record_processing_rows(self, blocks: Iterable[str], *columns: IntArray) -> None:
         of = np.array(blocks, dtype=object)
         for block in sorted(set(of.tolist())):
             tick, entered, started, behind, outcome = (c[of == block] for c in columns)
@@ -284,7 +287,7 @@ class Processor:
     # -- in a window ---------------------------------------------------------------------------
 
     def _serve_window(self, end: int) -> None:
-        entries = self._take_entries()
+        entries = self._pop_entries_sorted_by_block()
         ticks = [entry.message.tick[entry.bounds[:-1]] for entry in entries]
         tick = np.concatenate([*ticks, np.empty(0, dtype=np.int64)])
         order = np.argsort(tick, kind="stable")  # blocks of one instant enter by name
@@ -295,25 +298,27 @@ class Processor:
         blocks = np.array([*(entry.block for entry in entries), ""], dtype=object)[of]
         service = self._service.service_ticks(blocks, tick)
         if type(self._policy) is QueuePolicy:
-            done = self._serve_in_order(tick, service, blocks, end)
+            done = self._end_ticks_of_served_jobs(tick, service, blocks, end)
             for n, entry in enumerate(entries):
                 entry.done[number[of == n]] = done[of == n]
-                entry.send()
+                entry.deliver_finished_rows()
             return
         rows = (blocks, tick, service, [entries[n] for n in of.tolist()], number)
         jobs = [
-            _Job(*row) for row in zip(*(_list_of_integers(values) for values in rows), strict=True)
+            _Job(*row) for row in zip(*(_array_to_list(values) for values in rows), strict=True)
         ]
         for now, group in groupby(jobs, key=lambda job: job.entered):
             self._finish_jobs_until(now)
-            self._enter(now, group)
+            self._enqueue_jobs(now, group)
         self._finish_jobs_until(end - 1)
-        self._send_done()
+        self._deliver_finished_messages()
 
-    def _serve_in_order(
+    def _end_ticks_of_served_jobs(
         self, tick: IntArray, service: IntArray, blocks: np.ndarray, end: int
     ) -> IntArray:
-        """Return the ticks at which jobs end, in order of entry; record those before `end`."""
+        """Serve jobs in order of entry, return the ticks at which they end, and record those before
+        `end`.
+        """
         worked = np.cumsum(service)
         idle = np.maximum(tick, self._free_from) - (worked - service)
         ends: IntArray = np.maximum.accumulate(idle) + worked
@@ -326,10 +331,12 @@ class Processor:
         # Who entered before this instant and comes later waits behind it.
         behind = np.searchsorted(entered, done[:now]) - np.arange(1, now + 1)
         outcome = np.full(now, DONE, dtype=np.int64)
-        self._record_all(blocks[:now], done[:now], entered[:now], started[:now], behind, outcome)
+        self._record_processing_rows(
+            blocks[:now], done[:now], entered[:now], started[:now], behind, outcome
+        )
         self._under_way = (entered[now:], started[now:], done[now:], blocks[now:])
         return ends
 
 
-def _list_of_integers(values: Any) -> list[Any]:
+def _array_to_list(values: Any) -> list[Any]:
     return values.tolist() if isinstance(values, np.ndarray) else values

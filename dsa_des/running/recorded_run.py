@@ -76,16 +76,16 @@ def record_run(
         from dsa_des.record.arrow import ParquetSink
 
         scene_text = to_toml((recorded_as or loaded).resolved())
-        messages = simulation.recorded_messages()
+        messages = simulation.recorded_message_types()
         said = metadata_of_run(messages, scene_text, loaded.seed, simulation.ticks_per_s)
         tables = ParquetSink(folder, said)
         recorder.sinks += [tables, observers]
         started = time.perf_counter()
         try:
-            with _progress(simulation, silent=silent) as bar:
+            with _show_progress_bar(simulation, silent=silent) as bar:
                 outcome = simulation.run(progress or bar, pacer)
         finally:
-            tables.release()
+            tables.close_after_failure()
         summary = summarise_run(observers, outcome, target.path, notes)
         if pacer is not None:
             summary["realtime"] = pacer.report()
@@ -165,12 +165,14 @@ def _library_versions() -> dict[str, str]:
 
 
 @contextmanager
-def _progress(simulation: Simulation, *, silent: bool) -> Iterator[Callable[[float], None] | None]:
+def _show_progress_bar(
+    simulation: Simulation, *, silent: bool
+) -> Iterator[Callable[[float], None] | None]:
     """Show a progress bar if on a terminal; yield what moves it to a simulated time, s, or None."""
     if silent or not sys.stderr.isatty():
         yield None
         return
-    with terminal.progress("seconds") as bar:
+    with terminal.progress_bar("seconds") as bar:
         title = shorten(simulation.scene.title)
         task = bar.add_task(title, total=float(simulation.duration_s))
         yield lambda time_s: bar.update(task, completed=time_s)

@@ -10,7 +10,7 @@ from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.shadowed_packages import load_unnamed_entry_point
 from dsa_des.record.run_folder import REPORTS
 from dsa_des.record.sinks import Observer, call_or_note
-from dsa_des.running.grain import blocks_held_back
+from dsa_des.running.grain import blocks_held_back_from_windows
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.graph import loop_number_by_block
 from dsa_des.scene.scene import Scene
@@ -120,7 +120,7 @@ def _notes_of_slowing_blocks(simulation: Simulation) -> list[str]:
     scene = simulation.scene
     looped = sorted(loop_number_by_block(scene.graph))
     windowed = [name for name, node in simulation.nodes.items() if node.windowed]
-    kept = blocks_held_back(scene, windowed)
+    kept = blocks_held_back_from_windows(scene, windowed)
     # A window of a loop holds all blocks, so one outside of the loop counts as well.
     what = f"the feedback loop of {', '.join(looped)} runs" if looped else (
         f"{', '.join(kept)} run"

@@ -17,7 +17,7 @@ import simpy
 
 from dsa_des.arrays.types import IntArray
 from dsa_des.block.component import Component, may_end_its_run
-from dsa_des.block.foreign_calls import error_with_line, is_stop_request
+from dsa_des.block.foreign_calls import error_text_with_line, is_stop_request
 from dsa_des.block.message import Message
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.record.failure_counts import FailureCounts, FailuresByRun, sum_counts_over_runs
@@ -25,7 +25,7 @@ from dsa_des.record.recording import NotRecordedError, Recorder
 from dsa_des.running.assembly import Assembly
 from dsa_des.running.effects import Planned, WrapEffect, plan_timing_effects
 from dsa_des.running.events import Abort
-from dsa_des.running.grain import longest_window_ticks, refuse_endless_work, scans_per_run
+from dsa_des.running.grain import refuse_endless_work, scans_per_run, window_length_ticks
 from dsa_des.running.nodes import (
     build_nodes,
     build_processors,
@@ -146,7 +146,7 @@ class Simulation:
         rewinder = None
         if grain.rewinds:
             rewinder = Rewinder(self.nodes.values(), grain.cut_edges, recorder, self.runs)
-        longest = longest_window_ticks(self.nodes, self.runs, window)
+        longest = window_length_ticks(self.nodes, self.runs, window)
         #: Which windows the run goes through.
         self.windows: Windows = self.timeline.windows(
             longest, self.scans, shortest_delay_ticks(self.nodes, grain.cut_edges), rewinder
@@ -185,7 +185,7 @@ class Simulation:
             self.windows.limit_length(int(pacer.longest_window_s * self.ticks_per_s))
             pacer.start()
         else:
-            self.windows.next_instant = self._next_instant
+            self.windows.next_instant = self._lower_bound_of_next_run
         while (window := self.windows.next()) is not None:
             if pacer is not None and pacer.stopped:
                 break
@@ -202,7 +202,7 @@ class Simulation:
             if final is None:
                 continue
             if failure is not None:
-                self._raise(failure)
+                self._raise_with_exact_instant(failure)
             if self.recorder is not None:
                 self._call_recorder(
                     self.recorder.flush_if_large, *self.runs.rows_complete_before(final, going)
@@ -237,10 +237,10 @@ class Simulation:
         for node in self.nodes.values():
             node.start()
 
-    def _next_instant(self, tick: int, ahead: int) -> int:
+    def _lower_bound_of_next_run(self, tick: int, ahead: int) -> int:
         soonest = MAX_TICK
         for node in self.nodes.values():
-            soonest = min(soonest, node.next_run_bound(tick, ahead))
+            soonest = min(soonest, node.lower_bound_of_next_run(tick, ahead))
             if soonest <= tick:
                 break  # as most often
         return soonest
@@ -258,7 +258,9 @@ class Simulation:
                 )
 
     def _check_ready(self) -> None:
-        """Raise an error if a block still needs a host program or the simulation ran before."""
+        """Raise an error if a block still waits for a host program, or the simulation has run
+        already.
+        """
         hosted = [
             self.scene.problem(f"blocks.{name}.type", component.needs_host)
             for name, component in self.components.items()
@@ -273,7 +275,7 @@ class Simulation:
             )
         self._has_run = True
 
-    def recorded_messages(self) -> list[type[Message]]:
+    def recorded_message_types(self) -> list[type[Message]]:
         """Return the message types whose tables are recorded."""
         blocks = self.components.values()
         messages = [message for block in blocks for message in block.records()]
@@ -282,7 +284,7 @@ class Simulation:
     def _open_recorder(self) -> None:
         if self.recorder is not None:
             self.recorder.open(
-                self.recorded_messages(), self.ticks_per_s, self.runs,
+                self.recorded_message_types(), self.ticks_per_s, self.runs,
                 replicas=self.timeline.says_replica, platforms=self.platforms,
             )  # fmt: skip
 
@@ -294,7 +296,7 @@ class Simulation:
             cause = error.__cause__ or error
             component = self.nodes[error.block].component
             said = block_failure(component, int(error.ticks[0]) / self.ticks_per_s, cause)
-            self._raise(Failure(said, cause, error.ticks[:1]))
+            self._raise_with_exact_instant(Failure(said, cause, error.ticks[:1]))
 
     def _record(self, block: str, message: Message) -> None:
         if self.recorder is not None:
@@ -304,7 +306,7 @@ class Simulation:
         """Run every block over a window, and return the first failure of a block, or None."""
         self.window, self.failure = window, None
         for node in self.nodes.values():
-            node.open_window(window)
+            node.schedule_block_in_window(window)
         try:
             # A provisional window leaves the clock at its start, where all of it runs.
             self.env.run(until=None if window.provisional else window.end)
@@ -312,13 +314,15 @@ class Simulation:
             if self.failure is None:
                 raise
         for processor in self._processors.values():
-            processor.close_window()
+            processor.record_job_outcomes()
         return self.failure
 
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
     ) -> None:
-        """Record a block's error at `ticks`, and leave SimPy unless the window is provisional."""
+        """Record a block's error at `ticks`, and leave SimPy unless this window may still be
+        undone.
+        """
         if self.failure is None:  # a provisional window goes on; the first failure counts
             time_s, number = int(ticks[0]) / self.ticks_per_s, scan if scan >= 0 else None
             said = block_failure(node.component, time_s, error, number)
@@ -326,7 +330,7 @@ class Simulation:
         if not self.window.provisional:
             raise Abort
 
-    def _raise(self, failure: Failure) -> None:
+    def _raise_with_exact_instant(self, failure: Failure) -> None:
         """Raise a block's failure, if possible with its exact instant from a rerun scan by scan."""
         for component in self.components.values():
             component.close()
@@ -347,5 +351,5 @@ def block_failure(
     """Return a `BlockFailure` that describes the exception which a block raised at an instant."""
     cls = type(component)
     return BlockFailure(
-        component.name, cls.import_path(), time_s, scan, error_with_line(error, cls)
+        component.name, cls.import_path(), time_s, scan, error_text_with_line(error, cls)
     )

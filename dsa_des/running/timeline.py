@@ -14,7 +14,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.component import Component
 from dsa_des.record.failure_counts import FailuresByRun, counts_by_run
 from dsa_des.running.channel import Channel
-from dsa_des.running.effects import WireFaults, may_lose_or_delay
+from dsa_des.running.effects import WireFaults, has_simulated_loss_or_jitter
 from dsa_des.running.grain import Grain, choose_grain
 from dsa_des.running.windows import Rewinder, RewindingWindows, Windows
 from dsa_des.scene.scene import Scene
@@ -32,7 +32,9 @@ def _zero_jitter_draw(number: int) -> Callable[[IntArray], FloatArray]:
 
 
 class Timeline:
-    """Clocks, channels, outages, windows of a run; `everything` has clocks draw jitter at 0 too."""
+    """Clocks, channels, outages and windows of a run; with `everything`, clocks draw jitter even
+    where it is 0.
+    """
 
     count = 1
     says_replica = False
@@ -61,7 +63,7 @@ class Timeline:
             return None
 
         def jitter(number: int) -> Callable[[IntArray], FloatArray]:
-            return Streams(self.seeds[number]).scan_normals(name, "clock jitter")
+            return Streams(self.seeds[number]).scan_normal_function(name, "clock jitter")
 
         return RunClock(
             specs, self.scene.ticks_per_s, self.runs, jitter,
@@ -75,7 +77,7 @@ class Timeline:
         changes: list[tuple[int, list[ClockSpec]]] = []
         if not self.scene.stretches:
             return changes
-        for number, tick in enumerate(self.from_ticks.tolist()[1:]):
+        for number, tick in enumerate(self.stretch_start_ticks.tolist()[1:]):
             if (later := self.clock_specs(name, component, number)) != specs:
                 changes.append((tick, later))
                 specs = later
@@ -102,7 +104,7 @@ class Timeline:
         spec = component.clock_of(parameters)
         return [] if spec is None else [spec]
 
-    def channel(self, wires: Sequence[Wire], scan_delay_ticks: int) -> Channel:
+    def channel_of_wire(self, wires: Sequence[Wire], scan_delay_ticks: int) -> Channel:
         """Return the channel of a wire, with its delay and its random loss and lateness.
 
         `wires` are what the scene says of it in each stretch.
@@ -111,17 +113,20 @@ class Timeline:
         delays = np.array([round(one.total_delay_s * per_s) for one in wires], dtype=np.int64)
         least = int(delays.min())
         faults = None
-        if any(may_lose_or_delay(one, self._everything) for one in wires) or (delays > least).any():
+        if (
+            any(has_simulated_loss_or_jitter(one, self._everything) for one in wires)
+            or (delays > least).any()
+        ):
             late, lost = (self.streams.stream(str(wire), f"wire {of}") for of in ("jitter", "loss"))
             jitter_ticks = np.array([float(one.jitter_s * per_s) for one in wires])
             losses = np.array([one.drop_probability for one in wires])
             faults = WireFaults(
-                self.from_ticks, delays - least, jitter_ticks, losses, late, lost, per_s
+                self.stretch_start_ticks, delays - least, jitter_ticks, losses, late, lost, per_s
             )
         return Channel(wire.source, least + scan_delay_ticks, faults, self.runs)
 
     @property
-    def from_ticks(self) -> IntArray:
+    def stretch_start_ticks(self) -> IntArray:
         """The first tick of each stretch of the scene."""
         instants_s = [Fraction(0), *(stretch.from_s for stretch in self.scene.stretches)]
         return np.array([t * self.scene.ticks_per_s for t in instants_s], dtype=np.int64)
@@ -133,18 +138,22 @@ class Timeline:
             return None
         return Outages(failing, self.streams, self.runs, self.scene.ticks_per_s)
 
-    def stretched(self, instances: Sequence[Component]) -> StretchedBlock | None:
-        """Return what hands wakes to each stretch's instance; None if one serves all stretches."""
+    def block_switching_by_stretch(self, instances: Sequence[Component]) -> StretchedBlock | None:
+        """Return the object that hands wakes to the instance of their stretch; None if one serves
+        all.
+        """
         if all(one is instances[0] for one in instances):
             return None
-        return StretchedBlock(self.from_ticks, instances)
+        return StretchedBlock(self.stretch_start_ticks, instances)
 
     def grain(self, window: int | None) -> Grain:
         """Return which blocks run in windows or scan by scan; parameter as for `Simulation`."""
         return choose_grain(self.scene, window)
 
     def runner(self, component: Component) -> Any:
-        """Return the object that handles the wakes of a block: the block itself, or a stand-in."""
+        """Return the object that handles a block's wakes: the component itself, or one in its
+        place.
+        """
         return component
 
     def windows(
@@ -165,7 +174,7 @@ class Timeline:
         return Windows(self.runs, longest_ticks, horizon_ticks)
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
-        """Note that all has run, and return the components that report on the whole run."""
+        """Return block → component that reports on the whole run, once everything has run."""
         return components
 
     def failure_counts(self, components: Mapping[str, Component]) -> FailuresByRun:

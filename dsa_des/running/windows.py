@@ -61,11 +61,12 @@ class Demand:
     lead_ticks: int
 
     def instants_between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) at which the clocked block needs a row of ours.
+        """Return the instants in [start, end) when the upstream block must send for this one's
+        scans.
 
         None of these rows would arrive after the end of the run, where the clock has no scan.
         """
-        _, instants = self.clock.between(start + self.lead_ticks, end + self.lead_ticks)
+        _, instants = self.clock.scans_between(start + self.lead_ticks, end + self.lead_ticks)
         return instants.add_ticks(-self.lead_ticks) if self.lead_ticks else instants
 
 
@@ -92,7 +93,8 @@ class RunningBlock(Protocol):
 
 
 class Windows:
-    """Cuts runs into windows no longer than the horizon, some runs to their end, then the next.
+    """Cuts runs into windows no longer than the horizon, a group of runs up to their end, then the
+    next group.
 
     Nothing that is sent in a window comes back in it. The horizon is the lookahead of conservative
     parallel simulation (Chandy and Misra, "Distributed simulation: a case study in design and
@@ -206,7 +208,7 @@ class Rewinder:
         """Save the state of all blocks, wires and the record."""
         self._states = [_copy_state(vars(thing)) for thing in self._things]
         self._wires = [channel.state() for channel in self._channels]
-        self._recorded = None if self._recorder is None else self._recorder.mark()
+        self._recorded = None if self._recorder is None else self._recorder.count_for_rewind()
 
     def restore(self) -> None:
         """Restore the state that was saved last."""
@@ -219,9 +221,9 @@ class Rewinder:
             self._recorder.rewind(self._recorded)
         self.record_feedback_arrivals()
 
-    def first_feedback_arrival(self) -> int | None:
+    def earliest_feedback_tick(self) -> int | None:
         """Return the earliest feedback arrival tick since recording began; None if none came."""
-        ticks = [channel.first_pushed_arrival() for channel in self._feedback]
+        ticks = [channel.earliest_pushed_tick() for channel in self._feedback]
         return min((tick for tick in ticks if tick is not None), default=None)
 
 
@@ -259,8 +261,10 @@ class RewindingWindows(Windows):
         return Window(self.start, end, ahead, provisional)
 
     def commit(self, window: Window, failure: Failure | None) -> int | None:
-        """Keep a window that has run; undo it if a message came back in it or a block failed."""
-        back = self._rewinder.first_feedback_arrival()
+        """Keep a window that has run and return the tick before which all is final; if feedback
+        came in it or its failure is uncertain, undo it and return None.
+        """
+        back = self._rewinder.earliest_feedback_tick()
         early = window.end if back is None else back
         if failure is not None and window.ahead > window.end:
             # Perhaps it lies beyond the window: again, and nobody runs ahead.

@@ -39,7 +39,7 @@ class BlockOptions(Parameters):
     )
 
 
-def split_options(
+def split_engine_and_own_keys(
     table: Mapping[str, Any], parameters: type[Parameters]
 ) -> tuple[dict[str, Any], dict[str, Any]]:
     """Split a block's table into (the engine's keys, the block's own parameters)."""

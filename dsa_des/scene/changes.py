@@ -21,7 +21,7 @@ from typing import Any
 from dsa_des.block.component import to_scene_number
 from dsa_des.block.parameters import nested_models
 from dsa_des.block.registry import section_models
-from dsa_des.errors import SceneError, did_you_mean, shown_value
+from dsa_des.errors import SceneError, did_you_mean, shortened_repr
 from dsa_des.scene.block_table import BlockOptions, ProcessorParameters
 from dsa_des.scene.keys import Key, dotted_key, explain_no_item, flatten_tables, parse_key_path
 from dsa_des.scene.overrides import set_value
@@ -37,7 +37,8 @@ _KEYS = (*_INSTANTS, "set")
 
 @dataclass(frozen=True)
 class TimedChange:
-    """Values that some keys of a scene take from an instant on, for good or for a time.
+    """Values that some keys of a scene take from an instant on, to the end of the run or to a later
+    instant.
 
     Parameters
     ----------
@@ -67,7 +68,7 @@ class TimedChange:
         """Return, for example, ``from 30 s to 45 s: blocks.radar.enabled = false``."""
         until = " on" if self.to_s is None else f" to {float(self.to_s):g} s"
         values = ", ".join(
-            f"{key} = {str(value).lower() if isinstance(value, bool) else shown_value(value)}"
+            f"{key} = {str(value).lower() if isinstance(value, bool) else shortened_repr(value)}"
             for key, value in self.values.items()
         )
         return f"from {float(self.from_s):g} s{until}: {values}"
@@ -305,7 +306,9 @@ def stretches_of(
         del file.data[CHANGES]
         keys: dict[str, None] = {}
         for change in _changes_in_force(changes, instant):
-            source = f"{scene_file.source_of((CHANGES, change.number))}: changes[{change.number}]"
+            source = (
+                f"{scene_file.source_file_of((CHANGES, change.number))}: changes[{change.number}]"
+            )
             for text, value in change.values.items():
                 file.problems += set_value(file, text, value, source)
                 keys[text] = None
@@ -324,7 +327,7 @@ def _check_late_changes(
     changes: list[TimedChange],
     notes: list[str],
 ) -> None:
-    """Report changes after the run's end; only note them if that was set outside their file."""
+    """Report changes after the run's end, but only note them if another file sets that end."""
     if duration_s is None:
         return
     for change in changes:
@@ -334,7 +337,7 @@ def _check_late_changes(
         for key in late:
             at: Key = (CHANGES, change.number, key)
             message = f"is beyond the run's end, {float(duration_s):g} s"
-            if scene_file.source_of(at) == scene_file.source_of(("duration_s",)):
+            if scene_file.source_file_of(at) == scene_file.source_file_of(("duration_s",)):
                 scene_file.report(at, message, scene_file.data[CHANGES][change.number][key])
             elif key == first:
                 notes.append(f"{dotted_key(at)} is {float(change.from_s):g}: it {message}")

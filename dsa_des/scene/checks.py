@@ -19,9 +19,9 @@ from dsa_des.scene.block_table import (
     Block,
     BlockOptions,
     ProcessorParameters,
-    split_options,
+    split_engine_and_own_keys,
 )
-from dsa_des.scene.graph import unfed_inputs
+from dsa_des.scene.graph import unfed_required_inputs
 from dsa_des.scene.keys import Key, dotted_key
 from dsa_des.scene.overrides import drop_parameters_of_other_type
 from dsa_des.scene.parameter_errors import explain_validation_error
@@ -52,12 +52,12 @@ def report_silent_conversions(scene: SceneFile, key: Key, given: Any, parsed: An
     elif isinstance(parsed, bool) != isinstance(given, bool):
         if isinstance(parsed, bool | int | float):
             needed = "true or false" if isinstance(parsed, bool) else "a number"
-            scene.report(key, f"must be {needed}", _plain(given))
+            scene.report(key, f"must be {needed}", _str_subclass_to_str(given))
     elif isinstance(given, str) and isinstance(parsed, int | float):
-        scene.report(key, "must be a number", _plain(given))
+        scene.report(key, "must be a number", _str_subclass_to_str(given))
 
 
-def _plain(value: Any) -> Any:
+def _str_subclass_to_str(value: Any) -> Any:
     return str(value) if isinstance(value, str) else value
 
 
@@ -74,7 +74,7 @@ def checked_ticks_per_s(
     times = [wire.total_delay_s for wire in late]
     known = {name: spec for name, spec in clocks.items() if spec is not None}
     for spec in known.values():
-        times += spec.exact_times()
+        times += spec.times_needing_whole_ticks()
     ticks_per_s = common_ticks_per_second(times)
     longest_s = Fraction(MAX_TICK, ticks_per_s)
     if longest_s <= _A_DAY and longest_s <= 1 + (duration_s or _A_DAY):
@@ -183,7 +183,7 @@ def check_blocks_can_run(
     }
     for name, block in blocks.items():
         alive = block.cls.clocked == "demand" or block.cls.process is not None or name in woken
-        if unfed_inputs(name, block.cls, wires):  # that is said already
+        if unfed_required_inputs(name, block.cls, wires):  # that is said already
             continue
         if not alive and name in clocks and clocks[name] is None:
             message = (
@@ -249,13 +249,13 @@ def read_duration(scene_file: SceneFile) -> Fraction | None:
 def read_sections(scene_file: SceneFile) -> dict[str, Parameters]:
     """Return name → section for the tables of no block; those left out have their defaults."""
     read = {
-        name: read_table(scene_file, (name,), model, scene_file.data.get(name, {}))
+        name: parse_table(scene_file, (name,), model, scene_file.data.get(name, {}))
         for name, model in section_models().items()
     }
     return {name: section for name, section in read.items() if section is not None}
 
 
-def read_table(
+def parse_table(
     scene_file: SceneFile, key: Key, model: type[_Model], table: Any, what: str = ""
 ) -> _Model | None:
     """Return a table as an instance of `model`; None, with a report, if anything is wrong.
@@ -276,7 +276,9 @@ def read_table(
     return read
 
 
-def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any], dict[str, Block]]:
+def read_block_classes_and_blocks(
+    scene_file: SceneFile, notes: list[str]
+) -> tuple[dict[str, Any], dict[str, Block]]:
     """Return block → its class, None if unknown, and name → `Block` for the faultless blocks."""
     tables = scene_file.data.get("blocks", {})
     classes: dict[str, Any] = {}
@@ -312,13 +314,13 @@ def read_blocks(scene_file: SceneFile, notes: list[str]) -> tuple[dict[str, Any]
         notes += drop_parameters_of_other_type(scene_file, name, cls)
         for index, lost in scene_file.replaced.items():
             if index[:2] == key:
-                source, gone = scene_file.source_of(index), ", ".join(lost)
+                source, gone = scene_file.source_file_of(index), ", ".join(lost)
                 notes.append(
                     f"blocks.{name}: {dotted_key(index[2:])} of {source} takes the place of the "
                     f"whole list, {gone} too; a table [{dotted_key(index)}.NAME] changes one item "
                     "or adds one"
                 )
-        extra, given = split_options(table, cls.Parameters)
+        extra, given = split_engine_and_own_keys(table, cls.Parameters)
         given = _fill_from_first_file(scene_file, key, given, cls.Parameters)
         try:
             with wrap_foreign_errors(ValidationError):
@@ -363,7 +365,7 @@ def read_processors(
         scene_file.report(("processors",), "must hold one table per processor")
         return {}
     read = {
-        name: read_table(scene_file, ("processors", name), ProcessorParameters, tables[name])
+        name: parse_table(scene_file, ("processors", name), ProcessorParameters, tables[name])
         for name in sorted(tables)
     }
     for name, block in blocks.items():
@@ -387,7 +389,7 @@ def read_outages(scene_file: SceneFile, blocks: Mapping[str, Any], duration_s: A
         return []
     read: list[Outage] = []
     for number, entry in enumerate(entries):
-        outage = read_table(scene_file, ("outages", number), Outage, entry)
+        outage = parse_table(scene_file, ("outages", number), Outage, entry)
         if outage is None:
             continue
         for key, message, value in outage.refusals(blocks):

@@ -26,7 +26,7 @@ class DataScene(NamedTuple):
     about: list[str]
 
 
-def scene_of_data(path: Path) -> DataScene | None:
+def scene_from_data_file(path: Path) -> DataScene | None:
     """Return the scene an installed reader makes of a data file; None for TOML or unknown files."""
     if not is_regular_file(path) or path.suffix.lower() == ".toml":
         return None

@@ -31,7 +31,7 @@ def build_graph(blocks: Sequence[str], wires: Sequence[Wire]) -> nx.DiGraph:
     return graph
 
 
-def undelayed_edges(graph: nx.DiGraph) -> nx.DiGraph:
+def graph_of_undelayed_edges(graph: nx.DiGraph) -> nx.DiGraph:
     """Return a view of the graph with only those edges that act within an instant."""
     return nx.subgraph_view(graph, filter_edge=lambda a, b: not graph.edges[a, b]["delayed"])
 
@@ -50,12 +50,16 @@ def check_graph(
     """
     known = {name for name, cls in classes.items() if cls is not None}
     every = [wire for _, _, wires in graph.edges(data="wires") for wire in wires]
-    unfed = {name: unfed_inputs(name, classes[name], every) for name in sorted(known - unsure)}
+    unfed = {
+        name: unfed_required_inputs(name, classes[name], every) for name in sorted(known - unsure)
+    }
     for name, ports in unfed.items():
         for port in ports:
             declared = classes[name].inputs[port]
             message = f"input {port!r} ({declared.message.__name__}) is required and has no wire"
-            if scene.source_of(("blocks", name)) != (wiring := scene.source_of(("wires",))):
+            if scene.source_file_of(("blocks", name)) != (
+                wiring := scene.source_file_of(("wires",))
+            ):
                 message += f"; the wires of {Path(wiring).name} take the place of those that it "
                 message += "extends: repeat them there, or leave the block out: "
                 message += f'blocks.remove = ["{name}"]'
@@ -65,14 +69,14 @@ def check_graph(
         _check_reach(scene, graph, classes, {name for name, ports in unfed.items() if ports})
 
 
-def unfed_inputs(name: str, cls: type[Component], wires: Iterable[Wire]) -> list[str]:
+def unfed_required_inputs(name: str, cls: type[Component], wires: Iterable[Wire]) -> list[str]:
     """Return the required inputs of a block that no wire leads to, sorted."""
     fed = {wire.input for wire in wires if wire.target == name}
     return sorted(port for port, of in cls.inputs.items() if of.required and port not in fed)
 
 
 def _check_cycles(scene: SceneFile, graph: nx.DiGraph) -> None:
-    now = undelayed_edges(graph)
+    now = graph_of_undelayed_edges(graph)
     for group in nx.strongly_connected_components(now):
         first = min(group)
         if len(group) == 1 and not now.has_edge(first, first):
@@ -136,14 +140,14 @@ def loop_number_by_block(graph: nx.DiGraph) -> dict[str, int]:
 
 
 def block_depths(graph: nx.DiGraph, first: Collection[str] = ()) -> dict[str, int]:
-    """Return the depth of each block: the longest path to it over undelayed edges.
+    """Return block → depth: number of edges of the longest path to it over undelayed edges.
 
     Whatever the blocks in `first` do not depend on is deeper than they are.
     """
-    return _depths(undelayed_edges(graph), first)
+    return _longest_path_depths(graph_of_undelayed_edges(graph), first)
 
 
-def _depths(graph: nx.DiGraph, first: Collection[str]) -> dict[str, int]:
+def _longest_path_depths(graph: nx.DiGraph, first: Collection[str]) -> dict[str, int]:
     depth: dict[str, int] = {}
     for name in nx.topological_sort(graph):
         depth[name] = max((depth[before] + 1 for before in graph.predecessors(name)), default=0)
@@ -160,7 +164,7 @@ def window_order(
     queues: Mapping[str, Collection[str]] | None = None,
     first: Collection[str] = (),
 ) -> dict[str, int]:
-    """Return windowed block → depth: longest path to it among them, over delayed edges too.
+    """Return windowed block → depth: edges of the longest path to it, delayed ones included.
 
     A window is handled block by block, so a sender must be done with it before its receiver
     starts, whatever the delay between them; over the edges in `cut` it need not be. A queue (name
@@ -169,8 +173,8 @@ def window_order(
     """
     part = nx.DiGraph(graph.subgraph(windowed))
     part.remove_edges_from(cut)
-    part = add_queue_nodes(part, queues or {})
-    return _depths(part, first)
+    part = graph_with_queue_nodes(part, queues or {})
+    return _longest_path_depths(part, first)
 
 
 def queue_node_name(name: str) -> str:
@@ -178,7 +182,7 @@ def queue_node_name(name: str) -> str:
     return f"processor: {name}"
 
 
-def add_queue_nodes(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.DiGraph:
+def graph_with_queue_nodes(graph: nx.DiGraph, queues: Mapping[str, Collection[str]]) -> nx.DiGraph:
     """Return a graph with shared processors' queues between their blocks and the receivers."""
     wired = nx.DiGraph()
     wired.add_nodes_from(graph)

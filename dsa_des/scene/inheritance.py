@@ -61,7 +61,9 @@ class Inheritance:
         self._any_removals = True
         return Removals(Removal(str(name), source) for name in names)
 
-    def merge(self, base: dict[str, Any], over: Mapping[str, Any], at: Key) -> dict[str, Any]:
+    def merge_in_place(
+        self, base: dict[str, Any], over: Mapping[str, Any], at: Key
+    ) -> dict[str, Any]:
         """Merge `over` into `base` in place, table by table, and return `base`."""
         removals = over.get(REMOVE)
         blocks = set(base[BLOCKS]) if not at and isinstance(base.get(BLOCKS), dict) else set()
@@ -76,7 +78,7 @@ class Inheritance:
             if isinstance(value, Removals):
                 continue
             if isinstance(value, dict) and isinstance(mine, dict):
-                self.merge(mine, value, (*at, key))
+                self.merge_in_place(mine, value, (*at, key))
             elif isinstance(value, dict) and isinstance(mine, list) and item_names(mine):
                 self._merge_items(mine, value, (*at, key))
             else:
@@ -95,7 +97,7 @@ class Inheritance:
         kept = [
             (old, piece)
             for old, entry in enumerate(base[WIRES])
-            for piece in _drop_hops(entry, gone)
+            for piece in _wire_parts_without_blocks(entry, gone)
         ]
         sources = {k: v for k, v in self._sources.items() if k[:1] == (WIRES,) and len(k) > 1}
         for key in sources:
@@ -105,10 +107,12 @@ class Inheritance:
             self._sources |= {(WIRES, new, *key[2:]): file for key, file in inside.items()}
         base[WIRES] = [piece for _, piece in kept]
 
-    def note_values_beside(
+    def note_sibling_values(
         self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key
     ) -> None:
-        """Record the values beside each table in a block, in the file that first writes it."""
+        """Record the plain values beside each table inside a block, as of the file that first
+        writes it.
+        """
         for key, value in own.items():
             inherited = merged.get(key)
             if not (isinstance(value, dict) and isinstance(inherited, dict)):
@@ -117,9 +121,9 @@ class Inheritance:
                 values = {k: v for k, v in merged.items() if not isinstance(v, dict | list)}
                 self.beside.setdefault((*at, key), values)
             elif len(at) < 2 and (at or key == "blocks"):
-                self.note_values_beside(value, inherited, (*at, key))
+                self.note_sibling_values(value, inherited, (*at, key))
 
-    def finish_removals(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
+    def strip_and_report_removals(self, tables: dict[str, Any], at: Key) -> dict[str, Any]:
         """Strip ``remove``'s placeholders, report useless ones, and return a file's tables."""
         if self._any_removals:
             self._strip_removal_placeholders(tables, at)
@@ -154,7 +158,7 @@ class Inheritance:
                 continue
             self._move_sources((*at, name), (*at, index))
             if isinstance(value, dict) and isinstance(items[index], dict):
-                self.merge(items[index], value, (*at, index))
+                self.merge_in_place(items[index], value, (*at, index))
             else:
                 items[index] = value
         if isinstance(removals, Removals):
@@ -210,7 +214,7 @@ class Inheritance:
                 self._problems.append(Problem(removal.source, key, message, removal.text))
 
 
-def _drop_hops(entry: Any, gone: set[str]) -> list[Any]:
+def _wire_parts_without_blocks(entry: Any, gone: set[str]) -> list[Any]:
     """Return what remains of an entry of ``wires`` without hops from and to blocks in `gone`."""
     if isinstance(entry, dict):
         ends = [str(entry.get(end)).partition(".")[0].strip() for end in ("from", "to")]

@@ -50,14 +50,14 @@ def parse_assignment(text: str, option: str) -> tuple[str, str] | Problem:
     return key.strip(), value.strip()
 
 
-def parse_value(text: str) -> Any:
+def parse_toml_or_text(text: str) -> Any:
     """Return a value as TOML would read it; what is not TOML is text."""
     try:
         value = parse_toml(f"value = {text}")
     except NotToml:
-        return _add_working_directory(text)
+        return _tag_texts_with_working_folder(text)
     # What follows a line's end would be further keys.
-    return _add_working_directory(value["value"] if set(value) == {"value"} else text)
+    return _tag_texts_with_working_folder(value["value"] if set(value) == {"value"} else text)
 
 
 def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[Problem]]:
@@ -71,7 +71,7 @@ def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[P
             continue
         text, written = parsed
         try:
-            value = parse_value(written)
+            value = parse_toml_or_text(written)
         except TomlError as error:
             problems.append(Problem(COMMAND_LINE, text, str(error)))
             continue
@@ -195,7 +195,11 @@ def set_value(scene: SceneFile, text: str, value: Any, source: str) -> list[Prob
         if isinstance(container, dict) and index not in container:
             container[index] = {}
             scene.sources[tuple(key)] = source
-        elif key[0] == "wires" and len(key) == 2 and (table := _wire_table(container[index])):
+        elif (
+            key[0] == "wires"
+            and len(key) == 2
+            and (table := _arrow_wire_as_table(container[index]))
+        ):
             container[index] = table
         elif not isinstance(container[index], dict | list):
             return [Problem(source, text, f"{dotted_key(tuple(key))} is no table")]
@@ -241,7 +245,7 @@ def swap_type(
         scene.problems.append(Problem(source, key, str(error), str(type_name)))
         return []
     block = blocks[name]
-    dropped = sorted(key for key in block if key not in _known_keys(cls))
+    dropped = sorted(key for key in block if key not in _allowed_block_keys(cls))
     for parameter in dropped:
         del block[parameter]
     block["type"] = type_name
@@ -259,18 +263,19 @@ def drop_parameters_of_other_type(scene: SceneFile, name: str, cls: type[Compone
     for key, old in sorted(scene.of_other_type.items()):
         parameter = key[-1]
         mine = key[:2] == ("blocks", name) and parameter in block
-        if mine and parameter not in _known_keys(cls):
+        if mine and parameter not in _allowed_block_keys(cls):
             del block[parameter]
             notes.append(
-                f"{dotted_key(key)} of {scene.source_of(key)} was dropped: it is a parameter of "
-                f"{old}, and {scene.source_of(_type_key(name))} makes {name} a {block['type']}"
+                f"{dotted_key(key)} of {scene.source_file_of(key)} was dropped: it is a parameter "
+                f"of "
+                f"{old}, and {scene.source_file_of(_type_key(name))} makes {name} a {block['type']}"
             )
         elif mine and (meanings := _differing_descriptions(scene, old, cls, str(parameter))):
             notes.append(
-                f"{dotted_key(key)} of {scene.source_of(key)} is kept, though it means "
+                f"{dotted_key(key)} of {scene.source_file_of(key)} is kept, though it means "
                 "another thing: "
                 f"{meanings[0]!r} of {old}, {meanings[1]!r} of {block['type']}, which "
-                f"{scene.source_of(_type_key(name))} makes {name}"
+                f"{scene.source_file_of(_type_key(name))} makes {name}"
             )
     return notes
 
@@ -292,7 +297,7 @@ def _differing_descriptions(
     return None if begin[0] == begin[1] or not all(begin) else (begin[0], begin[1])
 
 
-def _known_keys(cls: type[Component]) -> set[str]:
+def _allowed_block_keys(cls: type[Component]) -> set[str]:
     return {"type", *BlockOptions.model_fields, *cls.Parameters.model_fields}
 
 
@@ -300,7 +305,7 @@ def _type_key(name: str) -> Key:
     return ("blocks", name, "type")
 
 
-def _wire_table(entry: Any) -> dict[str, str] | None:
+def _arrow_wire_as_table(entry: Any) -> dict[str, str] | None:
     """Return a wire written as ``a -> b`` as a table, for its options; None for anything else."""
     ends = [end.strip() for end in entry.split("->")] if isinstance(entry, str) else []
     return {"from": ends[0], "to": ends[1]} if len(ends) == 2 else None
@@ -337,11 +342,11 @@ def to_scene_value(value: Any, group: str = COMPONENTS) -> Any:
     )
 
 
-def _add_working_directory(value: Any) -> Any:
+def _tag_texts_with_working_folder(value: Any) -> Any:
     if isinstance(value, str):
         return with_source_folder(value, Path.cwd())
     if isinstance(value, list):
-        return [_add_working_directory(item) for item in value]
+        return [_tag_texts_with_working_folder(item) for item in value]
     if isinstance(value, dict):
-        return {key: _add_working_directory(item) for key, item in value.items()}
+        return {key: _tag_texts_with_working_folder(item) for key, item in value.items()}
     return value

@@ -21,9 +21,9 @@ def all_validator_messages(model: type[BaseModel], item: Any) -> list[str]:
     """Return the messages of all of a model's validators on a table that one of them refused."""
     texts = _error_texts(item.get("ctx", {}).get("error")) or [item["msg"]]
     try:
-        table = SchemaValidator(_fields_schema(model.__pydantic_core_schema__)).validate_python(
-            item["input"]
-        )
+        table = SchemaValidator(
+            _schema_without_validators(model.__pydantic_core_schema__)
+        ).validate_python(item["input"])
     except Exception:  # a foreign model may raise anything; the errors so far stand
         return texts
     return list(dict.fromkeys(texts + _validator_messages(model, table)))
@@ -39,7 +39,7 @@ def other_validator_messages(
     known = set(model.model_fields)
     refused = refused & known
     try:
-        schema = _relax_fields(_fields_schema(model.__pydantic_core_schema__), refused)
+        schema = _relax_fields(_schema_without_validators(model.__pydantic_core_schema__), refused)
         table = SchemaValidator(schema).validate_python(
             {key: given[key] for key in known & set(given)} | dict.fromkeys(refused)
         )
@@ -74,12 +74,12 @@ def _error_texts(error: Any) -> list[str]:
     return [] if error is None else [str(error)]
 
 
-def _fields_schema(schema: Any) -> Any:
+def _schema_without_validators(schema: Any) -> Any:
     """Return a model's pydantic core schema without its after-validators."""
     if schema["type"] == "function-after":
-        return _fields_schema(schema["schema"])
+        return _schema_without_validators(schema["schema"])
     if schema["type"] == "definitions":
-        return {**schema, "schema": _fields_schema(schema["schema"])}
+        return {**schema, "schema": _schema_without_validators(schema["schema"])}
     return schema
 
 
@@ -110,12 +110,12 @@ def explain_validation_error(
     problems = []
     refused: set[str] = set()
     for item in error.errors(include_url=False):
-        refused.update(_key_and_nearest_names(model, item))
-        at = _existing_path(scene_file, key, item["loc"])
+        refused.update(_key_and_nearest_known_key(model, item))
+        at = _path_without_union_tags(scene_file, key, item["loc"])
         if item["type"] == "extra_forbidden":
             *inside, name = map(str, item["loc"])
             instead = None if inside else getattr(model, "former", {}).get(name)
-            allowed = _sibling_names(model, item["loc"])
+            allowed = _allowed_field_names(model, item["loc"])
             close = nearest_name(name, [*allowed, *(() if inside else beside)])
             hint = f"; {instead}" if instead else did_you_mean(name, [close] if close else allowed)
             kind = "parameter" if key else "key"
@@ -160,10 +160,10 @@ def explain_validation_error(
     if refused and isinstance(given, Mapping):
         for text in other_validator_messages(model, given, refused):
             problems.append(_refusal_problem(scene_file, key, text, given))
-    return _merge_by_key(problems)
+    return _join_must_be_messages(problems)
 
 
-def _key_and_nearest_names(model: Any, item: Any) -> list[str]:
+def _key_and_nearest_known_key(model: Any, item: Any) -> list[str]:
     """Return the key that an error is about and, if that is unknown, the nearest known key."""
     if not item["loc"]:
         return []
@@ -174,7 +174,7 @@ def _key_and_nearest_names(model: Any, item: Any) -> list[str]:
     return [name, close] if close else [name]
 
 
-def _merge_by_key(problems: list[Problem]) -> list[Problem]:
+def _join_must_be_messages(problems: list[Problem]) -> list[Problem]:
     """Return the problems with those of one key that begin with ``must be`` joined by ``or``."""
     by_key: dict[tuple[str, str], Problem] = {}
     rest = []
@@ -248,7 +248,7 @@ def _plain_value_for_message(value: Any) -> Any:
     return str(value) if isinstance(value, str) else value
 
 
-def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
+def _path_without_union_tags(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) -> Key:
     """Return the path `key` + `loc` without the tags that pydantic inserts for unions."""
     value = _value_at(scene_file, key)
     path: list[str | int] = list(key)
@@ -264,7 +264,7 @@ def _existing_path(scene_file: SceneFile, key: Key, loc: tuple[str | int, ...]) 
     return tuple(path)
 
 
-def _sibling_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
+def _allowed_field_names(model: Any, loc: tuple[str | int, ...]) -> list[str]:
     """Return the field names allowed in the table of `loc`'s last part; empty if not a model."""
     names = [field.alias or name for name, field in model.model_fields.items()]
     for part in loc[:-1]:
@@ -287,7 +287,9 @@ def _nested_model(annotation: Any) -> Any:
     return None
 
 
-def block_refusal(file: SceneFile, block: str, parameters: Parameters, text: str) -> Problem:
+def problem_of_refusing_block(
+    file: SceneFile, block: str, parameters: Parameters, text: str
+) -> Problem:
     """Return the problem with a block that refused to start, at the key or file that it names.
 
     Texts begin with keys, ``ownship: alt_m is 2e6: ...``, or with a file that a key names.

@@ -61,7 +61,9 @@ def platform_by_block(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[
 
 
 def _feeding_blocks(scene: Scene, name: str, *, between: bool) -> list[str]:
-    """Return the blocks that feed `name` between platforms, or with `between` False otherwise."""
+    """Return the blocks that feed inputs of `name` that reach between platforms, or with `between`
+    False its other inputs.
+    """
     inputs = scene.blocks[name].cls.inputs
     return [
         wire.source
@@ -98,4 +100,4 @@ def _explain_no_platform(scene: Scene, name: str, known: Sequence[str] | None) -
         why = f"there is no such aircraft or place{did_you_mean(said, known)}"
     else:
         why = "no block of this scene says which aircraft there are"
-    return scene.setup_refusal(name, f"platform: {why}")
+    return scene.problem_of_setup_refusal(name, f"platform: {why}")

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import Any, Protocol
 
-from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, load_named
+from dsa_des.block.shadowed_packages import NotAllowed, NotImportable, import_named_object
 from dsa_des.errors import did_you_mean
 
 
@@ -63,7 +63,7 @@ def find_policy(name: Any) -> type[QueuePolicy]:
         hint, allowed = did_you_mean(str(name), POLICIES), ", ".join(map(repr, POLICIES))
         raise ValueError(f"must be one of {allowed}, or module:Class{hint}")
     try:
-        policy = load_named(name, "processors")
+        policy = import_named_object(name, "processors")
     except NotAllowed:
         return QueuePolicy
     except NotImportable as error:

@@ -27,7 +27,7 @@ from dsa_des.scene.checks import (
     check_blocks_can_run,
     check_effects,
     checked_ticks_per_s,
-    read_blocks,
+    read_block_classes_and_blocks,
     read_clocks,
     read_duration,
     read_outages,
@@ -47,11 +47,11 @@ from dsa_des.scene.overrides import (
     read_python_changes,
     read_sets,
 )
-from dsa_des.scene.parameter_errors import block_refusal
+from dsa_des.scene.parameter_errors import problem_of_refusing_block
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 from dsa_des.scene.wiring import Wire, add_block_latencies, read_wires
 from dsa_des.stretches.outage import Outage
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 from dsa_des.time.randomness import Streams
 
 _TOP_LEVEL = (
@@ -127,11 +127,11 @@ class Scene:
 
     def _repr_html_(self) -> str:
         rows = "".join(
-            f"<tr><td>{escape(printable(name))}<td>{escape(printable(block.type_name))}"
+            f"<tr><td>{escape(escape_unprintable(name))}<td>{escape(escape_unprintable(block.type_name))}"
             for name, block in self.blocks.items()
         )
-        wires = "<br>".join(escape(printable(wire)) for wire in self.wires)
-        heading = escape(printable(self.title))
+        wires = "<br>".join(escape(escape_unprintable(wire)) for wire in self.wires)
+        heading = escape(escape_unprintable(self.title))
         table = f"<table><tr><th>block</th><th>type</th></tr>{rows}</table>"
         return f"<p><b>{heading}</b>, seed {self.seed}</p>{table}<p>{wires}</p>"
 
@@ -215,14 +215,14 @@ class Scene:
         """Return a `Problem` with this message at a dotted key of the scene."""
         return Problem(str(self.path), key, message)
 
-    def setup_refusal(self, name: str, text: str) -> Problem:
+    def problem_of_setup_refusal(self, name: str, text: str) -> Problem:
         """Return the problem with a block that refused to start, at the key that it names first."""
         if self._tables is None:
             return self.problem(dotted_key(("blocks", name)), text)
-        return block_refusal(self._tables, name, self.blocks[name].parameters, text)
+        return problem_of_refusing_block(self._tables, name, self.blocks[name].parameters, text)
 
     @property
-    def queues(self) -> dict[str, list[str]]:
+    def blocks_by_shared_processor(self) -> dict[str, list[str]]:
         """Shared processor → the blocks whose messages queue at it."""
         queues: dict[str, list[str]] = {name: [] for name in sorted(self.processors)}
         for name, block in sorted(self.blocks.items()):
@@ -278,10 +278,10 @@ def load_scene(
     SceneError
         With every problem found.
     """
-    return load_tables(read_scene_file(path), sets, swaps, seed, duration_s)
+    return scene_from_tables(read_scene_file(path), sets, swaps, seed, duration_s)
 
 
-def load_tables(
+def scene_from_tables(
     scene_file: SceneFile,
     sets: Iterable[str] = (),
     swaps: Iterable[str] = (),
@@ -329,7 +329,7 @@ def check_scene(scene_file: SceneFile) -> Scene:
     duration = read_duration(scene_file)
     sections = read_sections(scene_file)
     notes: list[str] = []
-    classes, blocks = read_blocks(scene_file, notes)
+    classes, blocks = read_block_classes_and_blocks(scene_file, notes)
     unsure: set[str] = set()
     processors = read_processors(scene_file, blocks)
     wires = add_block_latencies(
@@ -354,12 +354,12 @@ def check_scene(scene_file: SceneFile) -> Scene:
         scene.stretches = stretches_of(scene_file, scene, scene.changes, check_scene)
         scene.ticks_per_s = common_ticks_per_s(scene_file, scene)
     if scene_file.problems and len(sections) == len(section_models()):
-        scene_file.problems += _refusals_of_blocks(scene)
-    scene_file.refuse()
+        scene_file.problems += _problems_of_unbuildable_blocks(scene)
+    scene_file.raise_if_problems()
     return scene
 
 
-def _refusals_of_blocks(scene: Scene) -> list[Problem]:
+def _problems_of_unbuildable_blocks(scene: Scene) -> list[Problem]:
     """Return the problems of blocks that refuse to be built, to show along with other errors.
 
     Each is made alone: a file that is not there, or two intruders of one name, show by that.
@@ -370,7 +370,7 @@ def _refusals_of_blocks(scene: Scene) -> list[Problem]:
         try:
             block.cls(name, block.parameters, context)
         except REFUSALS as error:
-            problems.append(scene.setup_refusal(name, describe_error(error)))
+            problems.append(scene.problem_of_setup_refusal(name, describe_error(error)))
         except BaseException as error:
             if is_stop_request(error):
                 raise
@@ -381,7 +381,7 @@ def describe_scene(scene: Scene) -> str:
     """Return a description of a scene in at most ten lines: title, length, seed, blocks."""
     length = "as long as its sources" if scene.duration_s is None else f"{scene.duration_s} s"
     types = ", ".join(f"{name} = {block.type_name}" for name, block in scene.blocks.items())
-    blocks = wrap(printable(types), _WIDTH, break_long_words=True)
+    blocks = wrap(escape_unprintable(types), _WIDTH, break_long_words=True)
     lines = [
         f"Scene {shorten(repr(scene.title))} ({shorten(str(scene.path))})",
         f"  {length}, seed {scene.seed}, {len(scene.blocks)} blocks:",

@@ -65,7 +65,7 @@ class SceneFile:
             setattr(tables, name, dict(getattr(self, name)))
         return tables
 
-    def source_of(self, key: Key) -> str:
+    def source_file_of(self, key: Key) -> str:
         """Return the file in which `key`, or the nearest table around it, was written."""
         for length in range(len(key), -1, -1):
             if key[:length] in self.sources:
@@ -74,13 +74,13 @@ class SceneFile:
 
     def problem(self, key: Key, message: str, *value: Any) -> Problem:
         """Return a `Problem` with this message at `key`, naming the file that holds the key."""
-        return Problem(self.source_of(key), dotted_key(key), message, *value)
+        return Problem(self.source_file_of(key), dotted_key(key), message, *value)
 
     def report(self, key: Key, message: str, *value: Any) -> None:
         """Add a problem with this message at `key` to the file's problems."""
         self.problems.append(self.problem(key, message, *value))
 
-    def refuse(self) -> None:
+    def raise_if_problems(self) -> None:
         """Raise a `SceneError` with all problems, duplicates removed, if there are any."""
         if self.problems:
             raise SceneError({str(problem): problem for problem in self.problems}.values())
@@ -124,7 +124,7 @@ class _Reader:
         return SceneFile(path, data, sources, of.of_other_type, of.beside, of.replaced)
 
     def read_file_tables(self, path: Path, at: Key, chain: tuple[Path, ...]) -> dict[str, Any]:
-        self._count_values(path, _VALUES_PER_FILE)
+        self._count_and_limit_values(path, _VALUES_PER_FILE)
         if path not in self._read:
             self._read[path] = _read_tables_or_error(path)
         real, tables = self._read[path]
@@ -163,10 +163,10 @@ class _Reader:
     def _finish_tables(
         self, own: Mapping[str, Any], merged: dict[str, Any], at: Key
     ) -> dict[str, Any]:
-        self._inheritance.note_values_beside(own, merged, at)
-        return self._inheritance.finish_removals(merged, at)
+        self._inheritance.note_sibling_values(own, merged, at)
+        return self._inheritance.strip_and_report_removals(merged, at)
 
-    def _count_values(self, path: Path, values: int = 1) -> None:
+    def _count_and_limit_values(self, path: Path, values: int = 1) -> None:
         self._taken += values
         if self._taken > _MOST_VALUES:
             message = f"with all that it extends, has more than {_MOST_VALUES:,} values"
@@ -189,7 +189,7 @@ class _Reader:
                 continue
             self.sources.setdefault(at, str(path))
             base_source = self.sources[at]
-            self._inheritance.merge(
+            self._inheritance.merge_in_place(
                 merged, self.read_file_tables(self._extended_path(path, base), at, chain), at
             )
             self.sources[at] = base_source
@@ -200,7 +200,7 @@ class _Reader:
         }
         if REMOVE in own:
             own[REMOVE] = self._inheritance.parse_removals(own[REMOVE], str(path))
-        return self._inheritance.merge(merged, own, at)
+        return self._inheritance.merge_in_place(merged, own, at)
 
     def _extended_path(self, path: Path, base: str) -> Path:
         """Return the path ``extends`` means: beside `path`, or the one shipped file so named."""
@@ -214,7 +214,7 @@ class _Reader:
         return shipped[0] if len(shipped) == 1 else beside
 
     def _resolve_value(self, value: Any, path: Path, at: Key, chain: tuple[Path, ...]) -> Any:
-        self._count_values(path)
+        self._count_and_limit_values(path)
         self.sources[at] = str(path)
         self._inheritance.of_other_type.pop(at, None)
         if isinstance(value, dict):
@@ -237,13 +237,15 @@ def _read_tables_or_error(path: Path) -> tuple[Path, dict[str, Any] | Exception]
         return path, error
 
 
-def merge(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
+def merge_tables_in_place(base: dict[str, Any], over: Mapping[str, Any]) -> dict[str, Any]:
     """Merge `over` into `base` in place, table by table, and return `base`."""
-    return Inheritance({}, []).merge(base, over, ())
+    return Inheritance({}, []).merge_in_place(base, over, ())
 
 
 def _similar_file_hint(path: Path, shipped: bool) -> str:
-    """Return a hint at the file meant, beside `path` or shipped, or a missing folder; or empty."""
+    """Return a hint at a similar file, beside `path` or shipped, or at a missing folder; else
+    empty.
+    """
     from dsa_des.errors import nearest_name
 
     missing, names = "", []
@@ -264,6 +266,6 @@ __all__ = [
     "Key",
     "SceneFile",
     "dotted_key",
-    "merge",
+    "merge_tables_in_place",
     "read_scene_file",
 ]

@@ -120,7 +120,7 @@ def read_wires(
         of_wire: list[Problem] = []  # of this wire: one block may be missing at several of its hops
         for source, target, options in hops:
             try:
-                wire = _connect(source, target, options, classes)
+                wire = _wire_between_ends(source, target, options, classes)
             except _WireError as error:
                 problem = scene.problem(key, str(error), *error.value)
                 if problem not in of_wire:
@@ -214,7 +214,7 @@ def _read_seconds(key: str, value: Any) -> Fraction:
     return seconds
 
 
-def _connect(
+def _wire_between_ends(
     source_end: str,
     target_end: str,
     options: dict[str, Any],
@@ -273,7 +273,9 @@ def _report_double_writers(
 
 
 def add_block_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:
-    """Return the wires with their senders' latency, marked if sent through a shared processor."""
+    """Return the wires with their senders' latency added, and a mark on those whose messages pass a
+    shared processor.
+    """
     return [
         replace(
             wire,

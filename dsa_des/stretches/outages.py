@@ -81,7 +81,9 @@ class Outages:
         return self._freeze_rows(port, message) if self._freezes else message
 
     def _freeze_rows(self, port: str, message: Message) -> Message:
-        """Return the message, frozen rows replaced by the run's last good row; remember that."""
+        """Return the message with frozen rows replaced by their run's last good row; remember the
+        last good rows.
+        """
         before = [self._last[port]] if port in self._last else []
         known = sum(map(len, before))
         both = message.concatenate([*before, message])

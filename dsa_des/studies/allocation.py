@@ -94,8 +94,10 @@ class Allocation:
         worth = np.sqrt(_weighted_sum(self.precision, left))
         return flight_probabilities(runs.weight * worth, self.size, self.least)
 
-    def predictions(self, runs: ForeseenRuns) -> FloatArray:
-        """Return each event's predicted chance in each run, (events, runs), 0 if not predicted."""
+    def predicted_event_chances(self, runs: ForeseenRuns) -> FloatArray:
+        """Return the predicted chance of each event in each run, (events, runs), 0 for events that
+        are not predicted.
+        """
         return np.where(self.predicted[:, np.newaxis], self._chances(runs), 0.0)
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
@@ -219,7 +221,8 @@ def best_probability_scale(
 def fit_logistic_coefficients(
     terms: FloatArray, expected: FloatArray, happened: FloatArray, weight: FloatArray
 ) -> FloatArray:
-    """Return the most probable coefficients of an event's logistic model, from expected chances.
+    """Return the most probable coefficients (level, weight of the expected chances, slopes) of an
+    event's logistic model.
 
     Newton's method on the logarithm of the likelihood and of a normal distribution of the
     coefficients (level, belief, slopes); with no event at all it stays near what was expected. A
@@ -231,7 +234,7 @@ def fit_logistic_coefficients(
     sd[:2] = _LEVEL_SD, _BELIEF_SD
     prior, at = np.diag(1.0 / sd**2), np.zeros(len(design))
 
-    def loss(coefficients: FloatArray) -> float:
+    def negative_log_posterior(coefficients: FloatArray) -> float:
         score = design.T @ coefficients + offset
         likely = weight @ (np.logaddexp(0.0, score) - happened * score)
         return float(likely + 0.5 * coefficients @ prior @ coefficients)
@@ -241,8 +244,8 @@ def fit_logistic_coefficients(
         slope = design @ (weight * (p - happened)) + prior @ at
         curve = (design * (weight * p * (1.0 - p))) @ design.T + prior
         step = np.linalg.solve(curve, slope)
-        part, here = 1.0, loss(at)
-        while part > 1e-6 and loss(at - part * step) > here:
+        part, here = 1.0, negative_log_posterior(at)
+        while part > 1e-6 and negative_log_posterior(at - part * step) > here:
             part /= 2.0
         at = at - part * step
         if np.abs(part * step).max() < 1e-8:
@@ -274,7 +277,9 @@ def _logistic(score: FloatArray) -> FloatArray:
 
 
 def round_ends(replicas: int, batch: int | None) -> list[int]:
-    """Return the replica before which each round ends; with a `batch`, rounds of that size."""
+    """Return the replica before which each round ends: rounds of `batch` replicas, or without one
+    growing rounds.
+    """
     if batch is not None:
         return [min(end, replicas) for end in range(batch, replicas + batch, batch)]
     ends, end = [], PILOT

@@ -19,9 +19,9 @@ import numpy as np
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.replicas.lock_step_size import RunSize
-from dsa_des.replicas.replicas import lock_step_refusal
+from dsa_des.replicas.replicas import reason_against_lock_step
 from dsa_des.running.loops import longest_delay_cut_edges
-from dsa_des.studies.chunk import ChunkResult, crashed_chunk_result, join_pieces
+from dsa_des.studies.chunk import ChunkResult, crashed_chunk_result, join_chunk_results
 from dsa_des.studies.study import Chunk, Study
 
 #: How often a chunk may lose its process before it is cut.
@@ -32,7 +32,9 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class Piece:
-    """Chunks to run in one process, or some runs of a chunk, and how often their process died."""
+    """Chunks, or some runs of one chunk, to run in one process, and how often a process died on
+    them.
+    """
 
     chunks: tuple[Chunk, ...]
     losses: int = 0
@@ -71,7 +73,9 @@ class Attempts:
         self._note_piece_ended()
         self._again.append(piece)
 
-    def take_results(self, piece: Piece, results: Iterable[ChunkResult]) -> list[ChunkResult]:
+    def accept_results_return_complete(
+        self, piece: Piece, results: Iterable[ChunkResult]
+    ) -> list[ChunkResult]:
         """Take in a finished piece's results, and return those of chunks that are now complete."""
         self._note_piece_ended()
         return [whole for one in results if (whole := self._join_if_complete(one)) is not None]
@@ -111,13 +115,15 @@ class Attempts:
         if self._missing[name]:
             return None
         del self._missing[name]
-        return join_pieces(name, self._there.pop(name))
+        return join_chunk_results(name, self._there.pop(name))
 
 
 def group_chunks(
     study: Study, chunks: Sequence[Chunk], workers: int
 ) -> Iterator[tuple[Chunk, ...]]:
-    """Yield groups of a cell's consecutive chunks for lock steps, with equal work per worker."""
+    """Yield groups of a cell's consecutive chunks to simulate at once, with equal work per
+    worker.
+    """
     if len(chunks) < 2:
         yield from ((chunk,) for chunk in chunks)
         return
@@ -144,13 +150,13 @@ def _consecutive_chunks(chunks: Iterable[Chunk]) -> Iterator[list[Chunk]]:
 
 
 def _lock_step_size(study: Study, cell: int) -> int:
-    """Return how many runs of a cell one lock step holds; 0 if lock step saves nothing.
+    """Return how many runs of a cell are simulated at once; 0 if that would save nothing.
 
     A feedback loop goes through as many windows, whatever these hold.
     """
     try:
         scene = study.scene(cell)
-        if not longest_delay_cut_edges(scene) or lock_step_refusal(
+        if not longest_delay_cut_edges(scene) or reason_against_lock_step(
             scene, [study.replica(n, cell) for n in (0, 1)]
         ):
             return 0

@@ -45,7 +45,7 @@ class Axis:
         return self.key.removeprefix("blocks.")
 
     @property
-    def numeric(self) -> bool:
+    def is_numeric(self) -> bool:
         """Whether all values of the axis are numbers."""
         return all(
             isinstance(label, int | float) and not isinstance(label, bool) for label in self.labels
@@ -76,7 +76,7 @@ def parse_axis(key: str, spec: Any, scene: Scene) -> Axis:
         if "set" in spec:
             return _linked_axis(key, spec)
         if "beat_with" in spec:
-            values = _phase_offsets(key, spec, scene)
+            values = _beat_phase_offsets_s(key, spec, scene)
         elif "values" in spec:
             values = spec["values"]
         else:
@@ -153,9 +153,9 @@ def _file_axis(key: str, spec: Mapping[str, Any]) -> Axis:
             if not matches:
                 raise ValueError(f"no file matches {base}")
             paths += matches
-        elif _is_readable_as(base, Path.is_dir):
+        elif _holds_for_path(base, Path.is_dir):
             raise ValueError(f'{base} is a folder; say which files of it, e.g. "{item}/*.daa"')
-        elif _is_readable_as(base, Path.is_file):
+        elif _holds_for_path(base, Path.is_file):
             paths.append(base)
         else:
             raise ValueError(f"there is no file {base}")
@@ -167,7 +167,7 @@ def _file_axis(key: str, spec: Mapping[str, Any]) -> Axis:
     return Axis(key, labels, sets, ((),) * len(labels), files=True)
 
 
-def _is_readable_as(path: Path, what: Callable[[Path], bool]) -> bool:
+def _holds_for_path(path: Path, what: Callable[[Path], bool]) -> bool:
     try:
         return what(path)
     except (OSError, ValueError):  # a text that can be no path
@@ -232,7 +232,7 @@ def _range_values(spec: Mapping[str, Any]) -> list[Any]:
     return [to_scene_number(low), *inner, to_scene_number(high)]
 
 
-def _phase_offsets(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
+def _beat_phase_offsets_s(key: str, spec: Mapping[str, Any], scene: Scene) -> list[Any]:
     """Return clock offsets, s, in equal steps over the time until two clocks are in step again."""
     parts = key.split(".")
     other = str(spec["beat_with"])

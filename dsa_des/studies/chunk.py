@@ -23,10 +23,10 @@ import pyarrow.parquet as pq
 
 from dsa_des.arrays.column_values import Text
 from dsa_des.arrays.types import AnyArray, IntArray
-from dsa_des.block.foreign_calls import error_with_kind, is_stop_request
+from dsa_des.block.foreign_calls import error_text_with_type, is_stop_request
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.files.sealed_files import sealable_parquet
-from dsa_des.record.failure_counts import FailureCounts, add_counts
+from dsa_des.record.failure_counts import FailureCounts, sum_failure_counts
 from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.replicas.lock_step_size import FEW, MOST_BYTES, RunSize, surely_fit_in_memory
 from dsa_des.replicas.replicas import Failed, Recorded, failure_counts_of_runs, run_replicas
@@ -44,10 +44,10 @@ from dsa_des.studies.allocation import Allocation
 from dsa_des.studies.foreseen_runs import (
     geometry_names,
     predict_results_and_errors,
-    sample_flown_runs,
+    sample_weights_and_predictions,
 )
 from dsa_des.studies.metric import Group, Metric, measure_one_by_one, missing_values, needed_columns
-from dsa_des.studies.splitting import Nearness, SplitEvent, run_split
+from dsa_des.studies.splitting import Nearness, SplitEvent, run_splitting_repetitions
 from dsa_des.studies.study import Chunk, Study, format_set_value
 
 #: After so many runs at once a worker looks for garbage, or the next ones stand beside it: blocks
@@ -78,8 +78,8 @@ def study_part_schema(study: Study) -> pa.Schema:
     scene = study.scene(0)
     metrics = [spec.build(scene) for spec in study.metrics]
     return part_schema(
-        [(axis.column, axis.numeric) for axis in study.axes],
-        [(draw_column(draw.key), draw.numeric) for draw in study.draws],
+        [(axis.column, axis.is_numeric) for axis in study.axes],
+        [(draw_column(draw.key), draw.is_numeric) for draw in study.draws],
         [result for metric in metrics for result in metric.results()],
         geometry_names(metrics) if study.allocate else (),
     )
@@ -99,7 +99,9 @@ def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
 
 @contextmanager
 def _delay_garbage_collection() -> Iterator[None]:
-    """Make garbage collection rare in the block, as a lock step's objects live to its end."""
+    """Inside the block, make garbage collection rare, as the objects of runs simulated together
+    live to its end.
+    """
     usual = gc.get_threshold()
     gc.set_threshold(max(usual[0], _OBJECTS_AT_ONCE) if usual[0] else 0, *usual[1:])
     try:
@@ -127,7 +129,7 @@ def _run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
             tables[k].append(rows.slice(begin, end - start))
             begin += end - start
     done = [
-        make_chunk_result(chunk.name, pa.concat_tables(parts), add_counts(said))
+        make_chunk_result(chunk.name, pa.concat_tables(parts), sum_failure_counts(said))
         for chunk, parts, said in zip(chunks, tables, failure_counts, strict=True)
     ]
     runs = sum(map(len, chunks))
@@ -160,10 +162,10 @@ def make_chunk_result(name: str, table: pa.Table, counts: FailureCounts) -> Chun
     )
 
 
-def join_pieces(name: str, parts: Sequence[ChunkResult]) -> ChunkResult:
+def join_chunk_results(name: str, parts: Sequence[ChunkResult]) -> ChunkResult:
     """Return the results of parts of a chunk as one, in order of cell and replica."""
     tables = [pq.read_table(pa.BufferReader(part.content)) for part in parts]
-    failure_counts = add_counts(map(failure_counts_of_part, tables))
+    failure_counts = sum_failure_counts(map(failure_counts_of_part, tables))
     rows = pa.concat_tables([table.replace_schema_metadata(None) for table in tables])
     done = make_chunk_result(
         name, rows.sort_by([("cell", "ascending"), ("replica", "ascending")]), failure_counts
@@ -182,11 +184,11 @@ def _run_identity_columns(study: Study, cell: int, numbers: Sequence[int]) -> di
     labels = study.labels(cell)
     for axis in study.axes:
         label = labels[axis.column]
-        rows[axis.column] = [label if axis.numeric else str(label)] * len(numbers)
+        rows[axis.column] = [label if axis.is_numeric else str(label)] * len(numbers)
     for draw in study.draws:
         values = [replica.changes[draw.key] for replica in replicas]
         rows[draw_column(draw.key)] = [
-            float(v) if draw.numeric else format_set_value(v) for v in values
+            float(v) if draw.is_numeric else format_set_value(v) for v in values
         ]
     return rows
 
@@ -254,8 +256,9 @@ def _run_cell(
                 scene, [nearness], runs, wrong, key, chunk_of[number], said
             ), wrong
 
-        rows["error"], values = run_split(
-            study.splitting, metrics[0], numbers, lambda number: study.repetition(number, cell),
+        rows["error"], values = run_splitting_repetitions(
+            study.splitting, metrics[0], numbers,
+            lambda number: study.first_runs_of_repetition(number, cell),
             measure, known=repr((study.tables, study.base.data, study.seed, study.sets,
                                  study.swaps, cell)),
         )  # fmt: skip
@@ -269,7 +272,7 @@ def _run_cell(
     for k, text in errors.items():
         rows["error"][k] = text
     results = [result for metric in metrics for result in metric.results()]
-    shares, predicted = sample_flown_runs(study, cell, numbers, plan, results, known)
+    shares, predicted = sample_weights_and_predictions(study, cell, numbers, plan, results, known)
     these = [k for k in np.flatnonzero(shares).tolist() if k not in errors]
     wrong: list[str | None] = [None] * len(these)
     some = [replicas[k] for k in these]
@@ -314,7 +317,7 @@ def _run_and_measure_replicas(
         part = replicas[done : done + many]
         if done and many >= _MANY_RUNS:
             gc.collect()
-        outcomes = _run_or_fail(scene, part, wanted)
+        outcomes = _run_and_catch_failures(scene, part, wanted)
         for chunk in np.unique(of[done : done + many]).tolist():
             mine = np.flatnonzero(of[done : done + many] == chunk)
             failure_counts[chunk].append(failure_counts_of_runs(outcomes[k] for k in mine))
@@ -338,7 +341,7 @@ def _run_and_measure_replicas(
 
 
 def _expected_run_size(scene: Scene, replica: Replica, wanted: Mapping[str, Any]) -> RunSize:
-    """Return a run's likely memory size before any ran, so lock steps need not start small."""
+    """Return a run's likely memory size before any has run, or a cautious guess if that fails."""
     try:
         return RunSize.estimate(replica_scene(scene, replica), wanted)
     except (SceneError, BlockFailure):  # its row says why
@@ -355,7 +358,7 @@ def _recorded_bytes(run: Recorded) -> int:
     return sum(c.codes.nbytes if isinstance(c, Text) else c.nbytes for c in columns)
 
 
-def _run_or_fail(
+def _run_and_catch_failures(
     scene: Scene, replicas: Sequence[Replica], wanted: Mapping[str, Any]
 ) -> list[Recorded | Failed]:
     """Run replicas and return their records or `Failed`; after an error all run one by one."""
@@ -364,7 +367,7 @@ def _run_or_fail(
     except (Exception, SystemExit) as error:  # a block that wants to leave does not end the study
         if len(replicas) == 1:
             return [Failed(f"{type(error).__name__}: {error}")]
-    return [_run_or_fail(scene, [replica], wanted)[0] for replica in replicas]
+    return [_run_and_catch_failures(scene, [replica], wanted)[0] for replica in replicas]
 
 
 def _measure_metrics(
@@ -384,6 +387,6 @@ def _measure_metrics(
             if is_stop_request(error):
                 raise
             if len(runs) == 1:
-                return {}, {0: f"metric {type(metric).__name__}: {error_with_kind(error)}"}
+                return {}, {0: f"metric {type(metric).__name__}: {error_text_with_type(error)}"}
             return measure_one_by_one(partial(_measure_metrics, scene, metrics), runs)
     return values, {}

@@ -43,7 +43,7 @@ class Draw:
     stratified: bool = False
 
     @property
-    def numeric(self) -> bool:
+    def is_numeric(self) -> bool:
         """Whether all values that may be drawn are numbers."""
         return all(isinstance(value, int | float) for value in self.values)
 
@@ -196,19 +196,19 @@ def axis_value_identity(axis: Axis, index: int) -> tuple[str, ...]:
         return (_label_text(axis.labels[index]),)
     path = Path(axis.sets[index][0][1])
     try:
-        return path.name, file_digest(path)
+        return path.name, file_sha256(path)
     except OSError:  # its runs say what is wrong with it
         return path.name, ""
 
 
-def file_digest(path: Path) -> str:
+def file_sha256(path: Path) -> str:
     """Return the SHA-256 of a file's content; a file that has not changed is read only once."""
     state = path.stat()
-    return _digest(str(path), state.st_mtime_ns, state.st_size, state.st_ino)
+    return _sha256_of_file(str(path), state.st_mtime_ns, state.st_size, state.st_ino)
 
 
 @lru_cache(maxsize=1 << 17)
-def _digest(path: str, *state: int) -> str:
+def _sha256_of_file(path: str, *state: int) -> str:
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 

@@ -21,7 +21,7 @@ from types import ModuleType
 from typing import Any, Protocol
 
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.block.shadowed_packages import is_ours
+from dsa_des.block.shadowed_packages import is_own_entry_point
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import Parts
 from dsa_des.studies.attempts import Attempts, Piece, group_chunks
@@ -101,7 +101,7 @@ class Local:
                 return
             wait(running, return_when=FIRST_COMPLETED)
             for worker in self._workers:
-                yield from _finished_pieces(worker, attempts)
+                yield from _results_of_finished_pieces(worker, attempts)
 
     def close(self) -> None:
         """Stop all workers."""
@@ -141,7 +141,7 @@ class _Worker:
         """Pop the front future and piece if it is finished or its process died; else None."""
         return self._given.popleft() if self._given and self._given[0][0].done() else None
 
-    def take_unfinished_pieces(self) -> list[Piece]:
+    def stop_and_take_unfinished(self) -> list[Piece]:
         """Stop a process that died, and return the pieces that it did not finish."""
         left = [piece for _, piece in self._given]
         self._given.clear()
@@ -158,13 +158,13 @@ class _Worker:
             self._pool = None
 
 
-def _finished_pieces(worker: _Worker, attempts: Attempts) -> Iterator[ChunkResult]:
+def _results_of_finished_pieces(worker: _Worker, attempts: Attempts) -> Iterator[ChunkResult]:
     while (first := worker.pop_if_done()) is not None:
         future, piece = first
         try:
-            done = attempts.take_results(piece, future.result())
+            done = attempts.accept_results_return_complete(piece, future.result())
         except BrokenProcessPool:
-            for other in worker.take_unfinished_pieces():
+            for other in worker.stop_and_take_unfinished():
                 attempts.requeue_piece(other)
             done = attempts.retry_after_crash(piece)
         yield from done
@@ -219,7 +219,9 @@ def _new_pool(study: Study) -> ProcessPoolExecutor:
 def _own_block_modules(study: Study) -> list[str]:
     """Return the names of those modules of a study's blocks that belong to this program."""
     ours = {
-        point.module.partition(".")[0] for point in entry_points_of().values() if is_ours(point)
+        point.module.partition(".")[0]
+        for point in entry_points_of().values()
+        if is_own_entry_point(point)
     }
     modules = {block.cls.__module__ for block in study.scene(0).blocks.values()}
     return sorted(name for name in modules if name.partition(".")[0] in ours)
@@ -236,11 +238,11 @@ def _start_worker(study: Study) -> None:
     parent = multiprocessing.parent_process()
     if parent is not None:
 
-        def follow() -> None:
+        def exit_with_parent() -> None:
             parent.join()
             os._exit(1)
 
-        threading.Thread(target=follow, daemon=True).start()
+        threading.Thread(target=exit_with_parent, daemon=True).start()
 
 
 def _run_in_worker(parts: Parts, chunks: Sequence[Chunk]) -> list[ChunkResult]:
@@ -308,7 +310,7 @@ class Dask:
         for future in running:
             piece = given.pop(future.key)
             try:
-                done = attempts.take_results(piece, future.result())
+                done = attempts.accept_results_return_complete(piece, future.result())
             except KilledWorker:
                 done = attempts.retry_after_crash(piece)
             submit()
@@ -340,7 +342,7 @@ def make_executor(kind: str, workers: int, scheduler: str | None) -> Executor:
     return Serial() if workers == 1 else Local(workers)
 
 
-def default_workers() -> int:
+def usable_processor_count() -> int:
     """Return how many processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))

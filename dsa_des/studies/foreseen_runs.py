@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dsa_des.arrays.types import AnyArray, FloatArray
-from dsa_des.block.foreign_calls import error_with_kind, is_stop_request
+from dsa_des.block.foreign_calls import error_text_with_type, is_stop_request
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.record import (
@@ -73,7 +73,9 @@ def allocation_refusal(study: Study, scene: Scene) -> str:
 
 
 def ratios_to_optimise(results: Sequence[Result], allocate: Sequence[str]) -> list[Result]:
-    """Return the ratio results sampling optimises: named ones, by default all not of one class."""
+    """Return the ratio results that `allocate` names; with ``auto`` all that cover every class of
+    runs.
+    """
     ratios = [result for result in results if result.ratio is not None]
     if AUTO in allocate:
         return [one for one in ratios if one.ratio is not None and one.ratio.only is None]
@@ -109,11 +111,11 @@ def predict_results_and_errors(
         if is_stop_request(error):
             raise
         if len(replicas) == 1:
-            return {}, {0: f"before it is flown: {error_with_kind(error)}"}
+            return {}, {0: f"before it is flown: {error_text_with_type(error)}"}
     return measure_one_by_one(partial(predict_results_and_errors, scene, metrics), replicas)
 
 
-def sample_flown_runs(
+def sample_weights_and_predictions(
     study: Study,
     cell: int,
     numbers: Sequence[int],
@@ -121,8 +123,8 @@ def sample_flown_runs(
     results: Sequence[Result],
     columns: Mapping[str, AnyArray],
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Return how many runs each run stands for, (runs,), 0 if it is not flown, and column →
-    predicted events.
+    """Draw the runs to fly; return how many runs each one stands for, (runs,), 0 if not flown, and
+    column → predicted events.
 
     Whether a run is flown depends on its seed and on what is known of it, and on no other run.
     """
@@ -135,7 +137,7 @@ def sample_flown_runs(
     draws = [uniform_of_replica(seed, "study allocation", number) for number in numbers]
     known = _foreseen_runs(columns, ratios)
     predicted: dict[str, FloatArray] = {}
-    for of, chance in zip(ratios, plan.predictions(known), strict=True):
+    for of, chance in zip(ratios, plan.predicted_event_chances(known), strict=True):
         name = geometry_column(predicted_column(of.above))
         predicted[name] = np.maximum(predicted.get(name, 0.0), chance)
     return sample_runs_to_fly(plan.probabilities(known), draws)[1], predicted
@@ -150,7 +152,7 @@ def _foreseen_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> For
                for of in ratios]  # fmt: skip
     return ForeseenRuns(
         np.array(geometry, dtype=np.float64),
-        np.array([_flags_in_class(columns, of, columns[of.below]) for of in ratios]),
+        np.array([_event_flags_in_class(columns, of, columns[of.below]) for of in ratios]),
         np.array(
             [
                 columns[name] if name in columns else np.full(len(weights[0]), UNTOLD)
@@ -161,8 +163,10 @@ def _foreseen_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> For
     )
 
 
-def _flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
-    """Return an event's flags as numbers, 0 if missing or for runs outside the class of a ratio."""
+def _event_flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
+    """Return an event's flags as 0 or 1; 0 where missing, or where a run is outside the ratio's
+    class.
+    """
     result: FloatArray = np.nan_to_num(flags.astype(np.float64))
     return result if of.only is None else result * (columns[of.only[0]] == of.only[1])
 
@@ -170,7 +174,9 @@ def _flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) ->
 def allocations_of_round(
     study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
 ) -> dict[int, Allocation]:
-    """Return cell → its plan for the round from replica `first`, learnt from before `number`."""
+    """Return cell → plan for the round from replica `first`, learnt from the rounds before
+    `number`.
+    """
     if not study.allocate:
         return {}
     ratios = [
@@ -185,14 +191,14 @@ def allocations_of_round(
     read = {geometry_column(name) for name in folder.record.geometry}
     read |= {name for of in ratios for name in of.columns_read()}
     plans = {}
-    for (cell,), chosen in rows.each_place():
+    for (cell,), chosen in rows.row_indices_by_axis_values():
         if cell not in cells:
             continue
         columns = {name: rows.column(name)[chosen] for name in read}
         stood = rows.column(STANDS_FOR)[chosen]
         if not (stood > 0.0).any():
             continue
-        happened = [_flags_in_class(columns, of, columns[of.above]) for of in ratios]
+        happened = [_event_flags_in_class(columns, of, columns[of.above]) for of in ratios]
         least = LEAST if first >= PILOT else FIRST_LEAST
         plans[int(cell)] = learn_allocation(
             _foreseen_runs(columns, ratios), np.array(happened), stood, least

@@ -17,7 +17,7 @@ from dsa_des.block.component import Component, Parameters
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Columns, Text
 from dsa_des.block.registry import ClassText
-from dsa_des.block.shadowed_packages import NotImportable, load_entry_point, load_named
+from dsa_des.block.shadowed_packages import NotImportable, import_named_object, load_entry_point
 from dsa_des.errors import did_you_mean
 from dsa_des.replicas.changed_scene import Replica
 from dsa_des.replicas.drawn_columns import ReplicaScenes, replica_scenes
@@ -54,8 +54,8 @@ __all__ = [
     "RatioOf",
     "Result",
     "blocks_recording",
-    "check_recorded",
-    "check_tables",
+    "check_tables_recordable",
+    "check_tables_recorded",
     "expected_column",
     "find_metric",
     "measure_one_by_one",
@@ -231,7 +231,7 @@ class Metric:
         raise NotImplementedError
 
     def scored_events(self) -> Sequence[str]:
-        """Return the names of the events for which `reached_s` tells how near a run comes."""
+        """Return the names of the events to which `reached_s` tells how near each run came."""
         return ()
 
     def reached_s(
@@ -274,7 +274,7 @@ def find_metric(name: str, beside: Sequence[Path] = ()) -> type[Metric]:
         raise ValueError(f"unknown metric{hint} (or module:Class)")
     try:
         result = (
-            load_named(name, "metrics", beside)
+            import_named_object(name, "metrics", beside)
             if point is None
             else load_entry_point(point, "metrics")
         )
@@ -302,7 +302,7 @@ def _tables_recorded_by(cls: type[Component]) -> set[str]:
     return {table for message in messages for table in message.recorded}
 
 
-def check_tables(metric: type[Metric], scene: Scene) -> None:
+def check_tables_recordable(metric: type[Metric], scene: Scene) -> None:
     """Raise ValueError unless some block of the scene records each table the metric reads."""
     for table in metric.tables:
         if not blocks_recording(scene, table):
@@ -313,7 +313,7 @@ def check_tables(metric: type[Metric], scene: Scene) -> None:
             )
 
 
-def check_recorded(metric: Metric, blocks: Mapping[str, Component]) -> None:
+def check_tables_recorded(metric: Metric, blocks: Mapping[str, Component]) -> None:
     """Raise ValueError unless blocks that are set up record each table the metric reads."""
     recorded = {
         table

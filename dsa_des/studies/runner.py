@@ -12,16 +12,16 @@ import pyarrow.compute as pc
 
 from dsa_des.errors import SceneError, UsageError
 from dsa_des.replicas.changed_scene import replica_scene
-from dsa_des.replicas.replicas import lock_step_refusal
+from dsa_des.replicas.replicas import reason_against_lock_step
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.record import CRASHED
 from dsa_des.results.rows import Rows, StoredRows
 from dsa_des.results.tables import Expected, Tables
-from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
+from dsa_des.studies.chunk import ChunkResult, join_chunk_results, make_chunk_result
 from dsa_des.studies.executors import Executor
 from dsa_des.studies.foreseen_runs import allocations_of_round
 from dsa_des.studies.study import Chunk, Study
-from dsa_des.studies.study_digest import record_of, results_of, write_explained
+from dsa_des.studies.study_digest import record_of, result_columns_of_study, write_explained
 
 
 @dataclass
@@ -46,7 +46,7 @@ def study_lock_step_refusal(study: Study) -> str | None:
     for cell in sorted({0, len(study.cells) - 1}):
         replicas = [study.replica(number, cell) for number in range(2)]
         try:
-            reason = lock_step_refusal(study.scene(cell), replicas)
+            reason = reason_against_lock_step(study.scene(cell), replicas)
         except SceneError:  # its rows say so
             continue
         if reason is not None:
@@ -60,7 +60,9 @@ def run_study(
     executor: Executor,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Run all that a study's open folder lacks, `report` per chunk, and return the counts."""
+    """Run all runs that a study's open folder lacks, call `report` after each chunk, and return the
+    counts.
+    """
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(study.cells)
     starts = [0, *study.round_ends[:-1]]
@@ -103,7 +105,7 @@ def _run_round(
     kept: dict[str, ChunkResult] = {}
     for chunk in chunks:
         rows = folder.part(chunk.name)
-        if rows is None or not _is_same_runs(rows, chunk):
+        if rows is None or not _has_runs_of_chunk(rows, chunk):
             missing.append(chunk)
             continue
         failure_counts = folder.failure_counts([chunk.name])
@@ -112,7 +114,9 @@ def _run_round(
         progress.runs += there.runs - there.crashed
         if there.crashed:
             crashed = np.asarray(pc.equal(rows["status"], CRASHED))
-            missing.append(replace(chunk, runs=_runs_in_rows(rows.filter(crashed)), whole=False))
+            missing.append(
+                replace(chunk, runs=_run_ranges_in_rows(rows.filter(crashed)), whole=False)
+            )
             if there.crashed < there.runs:
                 kept[chunk.name] = make_chunk_result(
                     chunk.name, rows.filter(~crashed), failure_counts
@@ -120,7 +124,11 @@ def _run_round(
     report(progress)
     try:
         for done in executor.run(study, folder.parts_destination, missing):
-            whole = join_pieces(done.name, [kept[done.name], done]) if done.name in kept else done
+            whole = (
+                join_chunk_results(done.name, [kept[done.name], done])
+                if done.name in kept
+                else done
+            )
             if whole.content:
                 folder.parts_destination.write(whole.name, whole.content)
             progress.runs += done.runs
@@ -142,7 +150,7 @@ def _remove_rounds_from(folder: StudyFolder, first: int) -> None:
             folder.remove_part(name)
 
 
-def _is_same_runs(rows: pa.Table, chunk: Chunk) -> bool:
+def _has_runs_of_chunk(rows: pa.Table, chunk: Chunk) -> bool:
     wanted = [np.arange(start, end) for _, start, end in chunk.runs]
     cells = np.repeat([cell for cell, _, _ in chunk.runs], [len(one) for one in wanted])
     return bool(
@@ -151,7 +159,7 @@ def _is_same_runs(rows: pa.Table, chunk: Chunk) -> bool:
     )
 
 
-def _runs_in_rows(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
+def _run_ranges_in_rows(rows: pa.Table) -> tuple[tuple[int, int, int], ...]:
     runs: list[tuple[int, int, int]] = []
     for cell, replica in zip(rows["cell"].to_pylist(), rows["replica"].to_pylist(), strict=True):
         if runs and runs[-1][0] == cell and runs[-1][2] == replica:
@@ -165,11 +173,11 @@ def _satisfied_cells(study: Study, folder: StudyFolder, number: int) -> set[int]
     """Return the cells with a narrow enough confidence interval after rounds before `number`."""
     stop = study.stop_when
     assert stop is not None
-    result = next(item for item in results_of(study) if item.name == stop.metric)
+    result = next(item for item in result_columns_of_study(study) if item.name == stop.metric)
     # What a killed attempt left of later rounds must not decide: it would not have been there.
     rows = Rows(StoredRows(folder, before_round=number), ["cell"], [])
     matches = set()
-    for (cell,), chosen in rows.each_place():
+    for (cell,), chosen in rows.row_indices_by_axis_values():
         estimate, _ = rows.estimate(result, chosen, study.confidence, study.interval)
         if not np.isnan(estimate.half_width) and estimate.half_width <= stop.half_width:
             matches.add(int(cell))
@@ -180,19 +188,19 @@ def _satisfied_cells(study: Study, folder: StudyFolder, number: int) -> set[int]
 _EXPECTED_OVER = 64
 
 
-def tables_of(study: Study, folder: StudyFolder) -> Tables:
+def result_tables_of_study(study: Study, folder: StudyFolder) -> Tables:
     """Return the tables of a study's results, with the analytic answers of its scenes."""
-    return Tables(record_of(study), folder, _expected_answers(study))
+    return Tables(record_of(study), folder, _mean_analytic_answers(study))
 
 
-def _expected_answers(study: Study) -> Expected:
+def _mean_analytic_answers(study: Study) -> Expected:
     """Return (result, axis values) → analytic answer, averaged over draws and encounters."""
     sums: dict[tuple[str, tuple[Any, ...]], list[float]] = {}
     many = min(study.replicas, _EXPECTED_OVER) if study.draws else 1
     for cell in study.cells:
         labels = study.labels(cell)
         at = tuple(
-            float(labels[axis.column]) if axis.numeric else str(labels[axis.column])
+            float(labels[axis.column]) if axis.is_numeric else str(labels[axis.column])
             for axis in study.axes
             if axis.column not in study.over
         )
@@ -211,7 +219,9 @@ def _expected_answers(study: Study) -> Expected:
     return {key: sum(values) / len(values) for key, values in sums.items()}
 
 
-def draw_run(study: Study, folder: StudyFolder, cell: int, replica: int) -> list[Path]:
+def rerun_and_draw_replica(
+    study: Study, folder: StudyFolder, cell: int, replica: int
+) -> list[Path]:
     """Run one replica of a cell again and draw it as ``dsa-des run`` does."""
     from dsa_des.running.recorded_run import record_run
 
@@ -232,7 +242,7 @@ class Clock:
         self._started = time.monotonic()
         self._already: int | None = None
 
-    def text(self, progress: Progress) -> str:
+    def progress_text(self, progress: Progress) -> str:
         """Return ``1200 of 10000 runs, 310/s, 28 s left, 2 failed``."""
         if self._already is None:
             self._already = progress.runs

@@ -70,11 +70,11 @@ class SplitEvent(Metric):
             Result(f"{name}.levels", CLASS, "levels of the score"),
         ]  # fmt: skip
 
-    def nearness_to_levels(self, score: str, levels: Sequence[float]) -> Nearness:
+    def metric_of_level_times(self, score: str, levels: Sequence[float]) -> Nearness:
         """Return the metric of when runs reach the given levels of a score."""
         return Nearness(self.metric, self.event, score, levels)
 
-    def results_of_repetitions(
+    def result_values_of_repetitions(
         self, found: Sequence[Repeated], levels: Sequence[float]
     ) -> dict[str, AnyArray]:
         """Return result → values of the repetitions; NaN or None for those that failed."""
@@ -102,7 +102,7 @@ Measure = Callable[
 ]
 
 
-def run_split(
+def run_splitting_repetitions(
     table: Splitting,
     metric: SplitEvent,
     numbers: Sequence[int],
@@ -118,8 +118,10 @@ def run_split(
     """
     candidates = metric.metric.scores[table.score]
 
-    def fly(runs: Sequence[Replica], number: IntArray, levels: Sequence[float]) -> FlownRuns:
-        values, wrong = measure(metric.nearness_to_levels(table.score, levels), runs, number)
+    def measure_level_times(
+        runs: Sequence[Replica], number: IntArray, levels: Sequence[float]
+    ) -> FlownRuns:
+        values, wrong = measure(metric.metric_of_level_times(table.score, levels), runs, number)
         nothing = np.full(len(runs), np.nan)
         times_s = [values.get(str(k), nothing) for k in range(len(levels))]
         return FlownRuns(np.array(times_s), values.get("weight", nothing), wrong)
@@ -128,12 +130,14 @@ def run_split(
         if table.levels is not None:
             levels = (*table.levels, float(candidates[-1]))
         elif (levels := _levels_found.get(known, ())) == ():
-            levels = _levels_found[known] = find_levels(*repetition(-1), candidates, fly)
+            levels = _levels_found[known] = find_levels(
+                *repetition(-1), candidates, measure_level_times
+            )
     except ValueError as error:
         return [str(error)] * len(numbers), {}
     runs, seeds = zip(*map(repetition, numbers), strict=True)
-    found = run_repetitions(runs, seeds, levels, fly)
-    return [one.error for one in found], metric.results_of_repetitions(found, levels)
+    found = run_repetitions(runs, seeds, levels, measure_level_times)
+    return [one.error for one in found], metric.result_values_of_repetitions(found, levels)
 
 
 #: By all that fixes them: every process finds the levels of a study by itself, and the same ones.

@@ -24,10 +24,10 @@ from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.allocation import Allocation, round_ends
 from dsa_des.studies.axes import Axis
 from dsa_des.studies.draws import Draw, member_seed, replica_seed
-from dsa_des.studies.metric import Metric, check_tables, find_metric
+from dsa_des.studies.metric import Metric, check_tables_recordable, find_metric
 from dsa_des.studies.splitting import SplitEvent, Splitting
 from dsa_des.studies.study_tables import existing_file
-from dsa_des.text.run_commands import format_value, run_command
+from dsa_des.text.run_commands import format_set_option_value, shell_command_of_run
 from dsa_des.text.safe_text import shell_line
 from dsa_des.time.randomness import key_of
 
@@ -48,7 +48,7 @@ class MetricSpec:
         cls = find_metric(self.name, (scene.path.parent,))
         try:
             with wrap_foreign_errors(ValueError):
-                check_tables(cls, scene)
+                check_tables_recordable(cls, scene)
                 metric = cls(cls.Parameters.model_validate(dict(self.keys)), scene)
                 return SplitEvent(metric, self.splits) if self.splits else metric
         except ForeignFailure as error:
@@ -132,7 +132,7 @@ class Study:
         """The numbers of all cells."""
         return range(math.prod(self._axis_lengths))
 
-    def indices(self, cell: int) -> tuple[int, ...]:
+    def axis_value_indices(self, cell: int) -> tuple[int, ...]:
         """Return the index of each axis's value in a cell; the last axis varies fastest."""
         return tuple(map(int, np.unravel_index(cell, self._axis_lengths)))
 
@@ -142,12 +142,14 @@ class Study:
 
     @property
     def runs_started_per_cell(self) -> int:
-        """Number of runs started per cell: the replicas, times a stage's runs with splitting."""
+        """Runs started per cell: its replicas, each times the runs of one stage if there is
+        splitting.
+        """
         return self.replicas * (1 if self.splitting is None else self.splitting.runs)
 
     @property
-    def batch(self) -> int:
-        """Replicas of a cell between two checks of the stop criterion; all without a criterion."""
+    def replicas_per_batch(self) -> int:
+        """Replicas of a cell between two checks of the stop criterion; all replicas without one."""
         return self.stop_when.batch if self.stop_when else self.replicas
 
     @property
@@ -155,17 +157,20 @@ class Study:
         """The replica before which each round ends; results are checked between rounds."""
         if self.allocate:
             return round_ends(self.replicas, self.stop_when.batch if self.stop_when else None)
-        return [min(n + self.batch, self.replicas) for n in range(0, self.replicas, self.batch)]
+        return [
+            min(n + self.replicas_per_batch, self.replicas)
+            for n in range(0, self.replicas, self.replicas_per_batch)
+        ]
 
     def labels(self, cell: int) -> dict[str, Any]:
         """Return column → label of every axis's value in a cell."""
-        indices = self.indices(cell)
+        indices = self.axis_value_indices(cell)
         return {a.column: a.labels[i] for a, i in zip(self.axes, indices, strict=True)}
 
     def swaps_and_sets(self, cell: int) -> tuple[list[tuple[str, str]], list[tuple[str, Any]]]:
         """Return (swaps, set values) from base to cell scene, each as (name, value) pairs."""
         swaps, sets = list(self.swaps), list(self.sets)
-        for axis, index in zip(self.axes, self.indices(cell), strict=True):
+        for axis, index in zip(self.axes, self.axis_value_indices(cell), strict=True):
             swaps += axis.swaps[index]
             sets += axis.sets[index]
         return swaps, sets
@@ -175,10 +180,12 @@ class Study:
         return changed_scene(self.base, *self.swaps_and_sets(cell), str(self.path))
 
     def member_seed(self, cell: int) -> int:
-        """Return the seed of all runs of a cell's encounter; the study's if axes are no sample."""
+        """Return the seed of a cell's runs: from its values of sampled axes; the study's without
+        such axes.
+        """
         if not self.over:
             return self.seed
-        members = zip(self.axes, self.indices(cell), strict=True)
+        members = zip(self.axes, self.axis_value_indices(cell), strict=True)
         return member_seed(self.seed, ((a, i) for a, i in members if a.column in self.over))
 
     def replica(self, number: int, cell: int = 0) -> Replica:
@@ -190,10 +197,10 @@ class Study:
         seed = self.member_seed(cell)
         return Replica(
             replica_seed(seed, number),
-            {draw.key: draw.value(seed, number, self.batch) for draw in self.draws},
+            {draw.key: draw.value(seed, number, self.replicas_per_batch) for draw in self.draws},
         )
 
-    def repetition(self, number: int, cell: int) -> tuple[list[Replica], int]:
+    def first_runs_of_repetition(self, number: int, cell: int) -> tuple[list[Replica], int]:
         """Return the first runs of a repetition of splitting, and the seed of its branches.
 
         Each of the runs is one of a plain study. Number -1 is the pilot, which has draws of its
@@ -215,7 +222,7 @@ class Study:
         changes = [
             (key, format_set_value(value)) for key, value in [*sets, *replica.changes.items()]
         ]
-        return run_command(str(self.scene_path), replica.seed, swaps, changes)
+        return shell_command_of_run(str(self.scene_path), replica.seed, swaps, changes)
 
     def chunks(
         self, round_number: int, cells: Sequence[int], plans: Mapping[int, Allocation] | None = None
@@ -252,7 +259,7 @@ def format_set_value(value: Any) -> str:
         from dsa_des.files.toml_files import inline_toml
 
         return inline_toml(value)
-    return format_value(value)
+    return format_set_option_value(value)
 
 
 def portable_command_line(words: Iterable[str], sets: Iterable[str], *paths: Path) -> str:

@@ -10,14 +10,14 @@ from dsa_des.errors.budgets import MOST_STUDY_SCANS
 from dsa_des.record.recording import Recorder
 from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.results.record import FRACTION, NUMBER, RATIO, SHARE, TRIALS, Result
-from dsa_des.results.summary import result_numbers_of_series
+from dsa_des.results.summary import numbers_by_series_result
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.keys import Key, parse_key_path
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.draws import Draw
 from dsa_des.studies.foreseen_runs import allocation_refusal
-from dsa_des.studies.metric import Metric, check_recorded
+from dsa_des.studies.metric import Metric, check_tables_recorded
 from dsa_des.studies.splitting import SplitEvent, splitting_refusal
 from dsa_des.studies.study import AUTO, Study
 
@@ -27,14 +27,14 @@ _MOST_DRAWN = 10_000
 _MOST_SCENES = 64
 
 
-def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
+def check_axes_draws_and_run(study: Study, file: SceneFile, scene: Scene) -> None:
     """Check every value of every axis, the draws, and one run up to its first event.
 
     Problems are those of `file`, the study's, and the `scene` without axes is checked where no cell
     has one that fits. Names of results are checked only where the whole study could be read.
     """
     whole, before = not file.problems, len(file.problems)
-    _check_axes(study, file)
+    _report_keys_of_two_axes(study, file)
     scenes: list[Scene] = []
     for cell in cells_covering_values(study):
         try:
@@ -45,7 +45,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
     first = scenes[0]
     _check_draws(study, first, file)
     results: dict[str, Result] = {}
-    for one in _scenes_by_block_types(scenes):
+    for one in _one_scene_per_block_types(scenes):
         where = "" if one is first else f" (with {_differing_types_text(one, first)})"
         built = _build_metrics(study, one, where, file)
         if one is first:
@@ -58,7 +58,7 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
             whole = False
             break
     if whole:
-        _check_names(study, results, file)
+        _check_result_names(study, results, file)
     if whole and study.splitting is not None:
         split_event = study.metrics[0].build(first)
         assert isinstance(split_event, SplitEvent)
@@ -80,12 +80,14 @@ def check_cells(study: Study, file: SceneFile, scene: Scene) -> None:
 
 
 def _check_last_of_sequences(study: Study, scenes: list[Scene], file: SceneFile) -> None:
-    """Set up a run with each sequence draw's last value; report failure, as for a short file."""
+    """Set up a run with each sequence draw's last value, and report failures, as where a file is
+    too short for it.
+    """
     last = study.runs_started_per_cell - 1
     for draw in study.draws:
         if draw.kind != "sequence" or not last:
             continue
-        value = draw.value(study.seed, last, study.batch)
+        value = draw.value(study.seed, last, study.replicas_per_batch)
         for scene in scenes[:_MOST_SCENES]:
             try:
                 _ = Simulation(replica_scene(scene, Replica(0, {draw.key: value}))).components
@@ -145,7 +147,7 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
             try:
                 if wrong is None or spec.index in wrong:
                     metric = spec.build(scene)
-                    check_recorded(metric, blocks)
+                    check_tables_recorded(metric, blocks)
                     metric.check(blocks)
             except ValueError as error:
                 refused[spec.index] = str(error)
@@ -159,15 +161,15 @@ def _check_set_up(study: Study, scenes: list[Scene], file: SceneFile) -> None:
         file.report(("metrics", k), text, names[k])
 
 
-def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -> None:
+def _check_result_names(study: Study, results: Mapping[str, Result], file: SceneFile) -> None:
     """Report result names that no metric produces, and figures that cannot show their results."""
     names = [n for n, r in results.items() if not n.endswith(TRIALS) and r.is_summarised]
 
-    def missing(key: Key, name: str) -> None:
+    def report_unknown_result(key: Key, name: str) -> None:
         file.report(key, f"no metric of the study gives it{did_you_mean(name, names)}", name)
 
     if study.stop_when and study.stop_when.metric not in names:
-        missing(("stop_when", "metric"), study.stop_when.metric)
+        report_unknown_result(("stop_when", "metric"), study.stop_when.metric)
     weight = study.compare_weight
     if weight is not None and (weight not in results or results[weight].kind != NUMBER):
         message = f"no metric of the study gives such a number{did_you_mean(weight, names)}"
@@ -179,14 +181,14 @@ def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -
             file.report(("allocate",), message, name)
     for number, wanted in enumerate(study.requirements):
         if wanted.metric not in names:
-            missing(("requirements", number, "metric"), wanted.metric)
+            report_unknown_result(("requirements", number, "metric"), wanted.metric)
     for number, figure in enumerate(study.figures):
         if figure.kind == "series":
-            if not result_numbers_of_series(str(figure.metric), results):
+            if not numbers_by_series_result(str(figure.metric), results):
                 message = "there are no such results with a number behind them (NAME.5, NAME.10)"
                 file.report(("figures", number, "metric"), message, str(figure.metric))
         elif figure.kind != "run" and figure.metric not in names:
-            missing(("figures", number, "metric"), str(figure.metric))
+            report_unknown_result(("figures", number, "metric"), str(figure.metric))
         elif figure.kind in ("histogram", "cdf") and (
             results[str(figure.metric)].kind not in (NUMBER, FRACTION, SHARE)
         ):
@@ -198,7 +200,7 @@ def _check_names(study: Study, results: Mapping[str, Result], file: SceneFile) -
             file.report(("figures", number, "metric"), message, str(figure.metric))
 
 
-def _check_axes(study: Study, file: SceneFile) -> None:
+def _report_keys_of_two_axes(study: Study, file: SceneFile) -> None:
     """Report keys that two axes set, of which the second would silently win."""
     owner: dict[tuple[str | int, ...], str] = {}
     for axis in study.axes:
@@ -240,13 +242,17 @@ def _extreme_drawn_values(draw: Draw, study: Study) -> list[Any]:
         return list(draw.values)
     if draw.kind == "sequence":
         return [
-            draw.value(study.seed, number, study.batch)
+            draw.value(study.seed, number, study.replicas_per_batch)
             for number in (0, study.runs_started_per_cell - 1)
         ]
     count = 1 if draw.kind == "normal" else min(study.replicas, _MOST_DRAWN)
     cells = study.cells if study.over else range(1)
     seeds = dict.fromkeys(map(study.member_seed, cells[: max(1, _MOST_DRAWN // count)]))
-    drawn = [draw.value(seed, number, study.batch) for seed in seeds for number in range(count)]
+    drawn = [
+        draw.value(seed, number, study.replicas_per_batch)
+        for seed in seeds
+        for number in range(count)
+    ]
     return list(dict.fromkeys([min(drawn), max(drawn)]))
 
 
@@ -279,7 +285,7 @@ def cells_covering_values(study: Study) -> list[int]:
     return [study.cell_at(indices) for indices in wanted]
 
 
-def _scenes_by_block_types(scenes: list[Scene]) -> list[Scene]:
+def _one_scene_per_block_types(scenes: list[Scene]) -> list[Scene]:
     """Return one scene for every distinct assignment of types to blocks."""
     by_types: dict[tuple[Any, ...], Scene] = {}
     for scene in scenes:

@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal, get_args, get_origin
 
-from dsa_des.block.mark import Mark, marks_of
+from dsa_des.block.mark import Mark, plot_mark_by_name
 from dsa_des.block.source_file import (
     absolute_file_path,
-    file_of,
+    file_of_module,
     is_python_file_path,
     split_type_name,
 )
@@ -28,13 +28,19 @@ from dsa_des.record.version import __version__
 from dsa_des.replicas.changed_scene import replica_scene
 from dsa_des.results.folder import StudyFolder
 from dsa_des.results.labels import short_text
-from dsa_des.results.models import EXPLAINED, Explained, SceneRecord, read_explained, versions
+from dsa_des.results.models import (
+    EXPLAINED,
+    Explained,
+    SceneRecord,
+    package_versions,
+    read_explained,
+)
 from dsa_des.results.record import Result, StudyRecord, draw_column
 from dsa_des.scene.keys import readable_key
 from dsa_des.scene.scene import Scene
 from dsa_des.scene.scene_file import read_scene_file
 from dsa_des.studies.axes import Axis
-from dsa_des.studies.draws import file_digest
+from dsa_des.studies.draws import file_sha256
 from dsa_des.studies.foreseen_runs import geometry_names
 from dsa_des.studies.study import Study, format_set_value
 from dsa_des.studies.study_checks import cells_covering_values
@@ -69,7 +75,7 @@ def study_json_text(study: Study) -> str:
         identity["splitting"] = vars(study.splitting)
     try:
         files = study_input_files(study)
-        identity["files"] = {str(path): file_digest(path) for path in sorted(files)}
+        identity["files"] = {str(path): file_sha256(path) for path in sorted(files)}
     except OSError as error:
         raise UsageError(f"{error.filename}: cannot be read: {error.strerror}") from error
     text = json.dumps(json_safe(identity), sort_keys=True)
@@ -81,7 +87,7 @@ def study_input_files(study: Study) -> set[Path]:
     given: list[Any] = [study.sets, study.swaps, [(axis.sets, axis.swaps) for axis in study.axes]]
     given += [[draw.values for draw in study.draws], [vars(spec) for spec in study.metrics]]
     beside = study.path.parent, study.scene_path.parent
-    return _files_in([study.base.data, given], beside)
+    return _files_named_in_value([study.base.data, given], beside)
 
 
 def record_of(study: Study) -> StudyRecord:
@@ -89,21 +95,23 @@ def record_of(study: Study) -> StudyRecord:
     return StudyRecord.model_validate_json(study_json_text(study))
 
 
-def _files_in(value: Any, beside: Sequence[Path]) -> set[Path]:
+def _files_named_in_value(value: Any, beside: Sequence[Path]) -> set[Path]:
     """Return the files that the texts in a value name: encounters, terrain, tables, modules.
 
     Their content fixes results as much as the values do. A relative name counts from the folder of
     the file that holds it; whichever way a file is named, its content is what counts.
     """
     if isinstance(value, Mapping):
-        return _files_in([item for key, item in value.items() if key not in _PROSE], beside)
+        return _files_named_in_value(
+            [item for key, item in value.items() if key not in _PROSE], beside
+        )
     if isinstance(value, list | tuple):
-        return set().union(*(_files_in(item, beside) for item in value))
+        return set().union(*(_files_named_in_value(item, beside) for item in value))
     if not isinstance(value, str):
         return set()
     try:
         files = _module_file(value, beside) or _named_files(value)
-        return set() if files is None else files | _files_extended_by(files)
+        return set() if files is None else files | _files_used_by_toml_files(files)
     except (OSError, ValueError):  # a text that can be no path
         return set()
 
@@ -131,11 +139,11 @@ def _module_file(text: str, beside: Sequence[Path]) -> set[Path] | None:
     if not all(part.isidentifier() for part in module.split(".")):
         return None
     own = [Path(text.folder)] if hasattr(text, "folder") else []
-    file = Path(file_of(module, [*own, *beside]))
+    file = Path(file_of_module(module, [*own, *beside]))
     return {file} if file.is_absolute() and file.is_file() else None
 
 
-def _files_extended_by(files: set[Path]) -> set[Path]:
+def _files_used_by_toml_files(files: set[Path]) -> set[Path]:
     """Return the files that the TOML files among `files` extend or name."""
     extended: set[Path] = set()
     for path in files:
@@ -143,25 +151,27 @@ def _files_extended_by(files: set[Path]) -> set[Path]:
             with contextlib.suppress(SceneError):  # its runs say what is wrong with it
                 scene = read_scene_file(path)
                 extended |= {Path(os.path.abspath(source)) for source in scene.sources.values()}
-                extended |= _files_in(scene.data, ())
+                extended |= _files_named_in_value(scene.data, ())
     return extended
 
 
-def geometry_of_study(study: Study) -> list[str]:
+def sampled_geometry_names(study: Study) -> list[str]:
     """Return the names of the quantities by which a study samples runs; none if all are flown."""
     scene = study.scene(0)
     return geometry_names([spec.build(scene) for spec in study.metrics]) if study.allocate else []
 
 
-def results_of(study: Study) -> list[Result]:
-    """Return the result columns that a study's metrics produce, with the marks of their blocks."""
+def result_columns_of_study(study: Study) -> list[Result]:
+    """Return the result columns of a study's metrics, each with the plot colour and marker of its
+    block if the block's class has them.
+    """
     scene = study.scene(0)
     results = [result for spec in study.metrics for result in spec.build(scene).results()]
-    marks = marks_of({name: block.cls for name, block in scene.blocks.items()})
-    return [_add_mark(result, scene, marks) for result in results]
+    marks = plot_mark_by_name({name: block.cls for name, block in scene.blocks.items()})
+    return [_add_colour_and_marker(result, scene, marks) for result in results]
 
 
-def _add_mark(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
+def _add_colour_and_marker(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result:
     """Return a result with the colour and marker of its block, if that block's class has them."""
     name = result.block or result.name.partition(".")[2]
     if name not in scene.blocks or getattr(scene.blocks[name].cls, "mark", None) is None:
@@ -169,7 +179,7 @@ def _add_mark(result: Result, scene: Scene, marks: Mapping[str, Mark]) -> Result
     return replace(result, mark=(marks[name].colour, marks[name].marker))
 
 
-def is_category(axis: Axis, scene: Scene) -> bool:
+def is_categorical_axis(axis: Axis, scene: Scene) -> bool:
     """Return whether an axis has names as values: types, flags or a parameter's named choices."""
     for key, _ in axis.sets[0] if axis.sets else ():
         parts = key.split(".")
@@ -204,8 +214,8 @@ def study_json_text_with_hash(study: Study, digest: str) -> str:
                 "words": readable_key(study.base.data, axis.key).removeprefix("blocks."),
                 "values": axis.labels,
                 "over": axis.column in study.over,
-                "numeric": axis.numeric,
-                "category": is_category(axis, study.scene(0)),
+                "numeric": axis.is_numeric,
+                "category": is_categorical_axis(axis, study.scene(0)),
                 "sets": [
                     [(key, format_set_value(value)) for key, value in one] for one in axis.sets
                 ],
@@ -214,18 +224,18 @@ def study_json_text_with_hash(study: Study, digest: str) -> str:
             for axis in study.axes
         ],
         "draws": [
-            {"key": draw.key, "column": draw_column(draw.key), "numeric": draw.numeric}
+            {"key": draw.key, "column": draw_column(draw.key), "numeric": draw.is_numeric}
             for draw in study.draws
         ],
         "results": [
             vars(result) | {"ratio": None if result.ratio is None else vars(result.ratio)}
-            for result in results_of(study)
+            for result in result_columns_of_study(study)
         ],
         "sets": [(key, format_set_value(value)) for key, value in study.sets],
         "swaps": study.swaps,
         "compare": study.baseline,
         "compare_weight": study.compare_weight,
-        "geometry": geometry_of_study(study),
+        "geometry": sampled_geometry_names(study),
         "stop_when": None if study.stop_when is None else vars(study.stop_when),
         "confidence": study.confidence,
         "interval": study.interval,
@@ -244,7 +254,7 @@ def study_json_text_with_hash(study: Study, digest: str) -> str:
     return json.dumps(json_safe(content), indent=2, allow_nan=False) + "\n"
 
 
-def explain_study(study: Study) -> Explained:
+def explained_record_of_study(study: Study) -> Explained:
     """Return the record of package versions, scene and models behind a study's runs."""
     scenes: list[SceneRecord] = []
     text = ""
@@ -259,7 +269,7 @@ def explain_study(study: Study) -> Explained:
             continue  # its rows say why
         scenes.append(_entries_not_in_first(record, scenes[0]) if scenes else record)
     scenes = [one for one in scenes if one.models or one.effects or one.spared]
-    return Explained(versions=versions(), scene=text, scenes=scenes)
+    return Explained(versions=package_versions(), scene=text, scenes=scenes)
 
 
 def _entries_not_in_first(result: SceneRecord, first: SceneRecord) -> SceneRecord:
@@ -272,6 +282,6 @@ def _entries_not_in_first(result: SceneRecord, first: SceneRecord) -> SceneRecor
 def write_explained(study: Study, folder: StudyFolder) -> None:
     """Write ``explained.json`` into a study's folder, unless it is there."""
     if read_explained(folder) is None:
-        content = explain_study(study).model_dump()
+        content = explained_record_of_study(study).model_dump()
         text = json.dumps(content, indent=1, allow_nan=False) + "\n"
         folder.write_file(EXPLAINED, text.encode())

@@ -14,7 +14,7 @@ from dsa_des.block.source_file import absolute_type_name
 from dsa_des.errors import Problem, SceneError, did_you_mean
 from dsa_des.errors.budgets import MOST_CELLS, MOST_RUNS
 from dsa_des.results.record import Requirement, StopWhen
-from dsa_des.scene.checks import read_table, report_silent_conversions
+from dsa_des.scene.checks import parse_table, report_silent_conversions
 from dsa_des.scene.examples import find_example
 from dsa_des.scene.keys import Key, flatten_tables
 from dsa_des.scene.overrides import SWAP, apply_sets, read_sets
@@ -26,7 +26,7 @@ from dsa_des.studies.draws import Draw, flatten_draws, parse_draw
 from dsa_des.studies.metric import METRICS, find_metric
 from dsa_des.studies.splitting import Splitting
 from dsa_des.studies.study import MetricSpec, Study, changed_scene
-from dsa_des.studies.study_checks import check_cells
+from dsa_des.studies.study_checks import check_axes_draws_and_run
 from dsa_des.studies.study_tables import (
     CompareTable,
     RequirementTable,
@@ -163,7 +163,7 @@ class _StudyReader:
                 keys.figures,
                 axes,
                 {"cell": cells, "replica": keys.replicas},
-                lambda key, name: self.column(key, name, axes),
+                lambda key, name: self.results_column_of_axis(key, name, axes),
             ),
             compare_weight=weight,
             requirements=self.requirements(axes),
@@ -173,8 +173,8 @@ class _StudyReader:
             base=base,
             tables=resolve_tables(self.data, swaps),
         )
-        check_cells(study, file, scene)
-        file.refuse()
+        check_axes_draws_and_run(study, file, scene)
+        file.raise_if_problems()
         return study
 
     def checked_keys(self) -> StudyKeys:
@@ -263,7 +263,7 @@ class _StudyReader:
                 self.file.report(("draws", key), str(error))
         return tuple(draws)
 
-    def column(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
+    def results_column_of_axis(self, key: Key, name: Any, axes: tuple[Axis, ...]) -> str | None:
         """Return the results column of axis `name`; None, with a report, if there is none."""
         columns = [axis.column for axis in axes]
         wanted = str(name).removeprefix("blocks.")
@@ -280,7 +280,9 @@ class _StudyReader:
         if names is None:
             return tuple(axis.column for axis in axes if axis.files)
         names = [names] if isinstance(names, str) else names
-        return tuple(c for n in names if (c := self.column(("over",), n, axes)) is not None)
+        return tuple(
+            c for n in names if (c := self.results_column_of_axis(("over",), n, axes)) is not None
+        )
 
     def read_baseline_and_weight(
         self, axes: tuple[Axis, ...]
@@ -289,10 +291,10 @@ class _StudyReader:
         if self.keys.compare is None:
             first = next((axis for axis in axes if axis.key.startswith("swap.")), None)
             return None if first is None else (first.column, first.labels[0]), None
-        table = read_table(self.file, ("compare",), CompareTable, self.keys.compare)
+        table = parse_table(self.file, ("compare",), CompareTable, self.keys.compare)
         if table is None:
             return None, None
-        column = self.column(("compare", "axis"), table.axis, axes)
+        column = self.results_column_of_axis(("compare", "axis"), table.axis, axes)
         if column is None:
             return None, table.weight
         axis = next(axis for axis in axes if axis.column == column)
@@ -313,11 +315,11 @@ class _StudyReader:
         requirements: list[Requirement] = []
         for number, item in enumerate(self.keys.requirements):
             key: Key = ("requirements", number)
-            asked = read_table(self.file, key, RequirementTable, item)
+            asked = parse_table(self.file, key, RequirementTable, item)
             if asked is None:
                 continue
             limit, below = (asked.least, False) if asked.most is None else (asked.most, True)
-            along = self.column((*key, "axis"), asked.axis, axes)
+            along = self.results_column_of_axis((*key, "axis"), asked.axis, axes)
             if along is not None and limit is not None:
                 last = asked.cheaper == "last"
                 requirements.append(Requirement(asked.metric, along, limit, below, last))
@@ -348,7 +350,7 @@ class _StudyReader:
             except ValueError as error:
                 self.file.report(key, str(error), name)
                 continue
-            if read_table(self.file, key, model, keys, f"metric {name}") is not None:
+            if parse_table(self.file, key, model, keys, f"metric {name}") is not None:
                 specs.append(MetricSpec(name, keys, number, event))
         if splitting is not None and len(items) > 1:
             said = "splitting is for one event: leave the one metric that gives it"
@@ -359,7 +361,7 @@ class _StudyReader:
         """Return the settings of splitting; None if there are none, or wrong ones (reported)."""
         if self.keys.splitting is None:
             return None
-        table = read_table(self.file, ("splitting",), SplittingTable, self.keys.splitting)
+        table = parse_table(self.file, ("splitting",), SplittingTable, self.keys.splitting)
         if self.keys.replicas < 2:
             said = "are the repetitions of splitting: its interval needs 2 or more, better 20"
             self.file.report(("replicas",), said, self.keys.replicas)
@@ -374,7 +376,7 @@ class _StudyReader:
     def stop_when(self) -> StopWhen | None:
         if self.keys.stop_when is None:
             return None
-        table = read_table(self.file, ("stop_when",), StopWhenTable, self.keys.stop_when)
+        table = parse_table(self.file, ("stop_when",), StopWhenTable, self.keys.stop_when)
         if table is None:
             return None
         replicas = self.keys.replicas

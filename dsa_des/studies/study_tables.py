@@ -11,11 +11,11 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_valida
 from dsa_des.block.component import SourcedText
 from dsa_des.errors import did_you_mean
 from dsa_des.results.record import FigureKind, FigureRecord
-from dsa_des.scene.checks import read_table
+from dsa_des.scene.checks import parse_table
 from dsa_des.scene.keys import Key
 from dsa_des.scene.scene_file import SceneFile
 from dsa_des.studies.axes import Axis
-from dsa_des.text.run_commands import format_value
+from dsa_des.text.run_commands import format_set_option_value
 
 #: Tables that name axes and results; ``wires[4].drop_probability`` is no pattern of files there.
 _NAMING_RESULTS = ("title", "description", "figures", "compare", "over", "stop_when", "allocate",
@@ -80,7 +80,7 @@ def json_safe(value: Any) -> Any:
         return value if abs(value) < 2**63 else hex(value)
     if isinstance(value, float):
         return value if math.isfinite(value) else repr(value)
-    return format_value(value)
+    return format_set_option_value(value)
 
 
 def _as_list(items: Any) -> Any:
@@ -149,7 +149,7 @@ class SplittingTable(StudyTable):
 
     @field_validator("levels")
     @classmethod
-    def _fall(cls, levels: list[float] | None) -> list[float] | None:
+    def _check_levels_fall(cls, levels: list[float] | None) -> list[float] | None:
         if levels is not None and any(b >= a for a, b in pairwise(levels)):
             raise ValueError("must fall, from far to near, for example [20, 12]")
         return levels
@@ -203,7 +203,7 @@ def read_figures(
     figures: list[FigureRecord] = []
     for number, item in enumerate(tables):
         key: Key = ("figures", number)
-        figure = read_table(file, key, FigureTable, item)
+        figure = parse_table(file, key, FigureTable, item)
         if figure is None:
             continue
         kind, allowed = figure.kind, ("kind", "title", *_KEYS_OF_FIGURES[figure.kind])
@@ -224,7 +224,7 @@ def read_figures(
             what = "heat map" if kind == "heat" else "map"
             file.report(key, f"a {what} needs two axes; the study has {len(axes)}")
         chosen = [axis for axis in axes if columns.get("axis", axes[0].column) == axis.column]
-        if kind == "polar" and chosen and not chosen[0].numeric:
+        if kind == "polar" and chosen and not chosen[0].is_numeric:
             said = f"a polar figure needs an axis in degrees; {chosen[0].column} is no number"
             file.report(key, said)
         # What is wrong with it is reported, and then no study is made.

@@ -7,7 +7,7 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.text import Text
 
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 
 class SafeConsole(Console):
@@ -23,7 +23,7 @@ class SafeConsole(Console):
     def render_str(self, text: str, **options: Any) -> Text:
         """Return a ``str`` as rich Text without markup, with control characters escaped."""
         options |= {"markup": False, "emoji": False}
-        return super().render_str(printable(text), **options)
+        return super().render_str(escape_unprintable(text), **options)
 
     def render(
         self, renderable: RenderableType, options: ConsoleOptions | None = None
@@ -36,5 +36,5 @@ class SafeConsole(Console):
                 yield segment
                 continue
             # A stream may know fewer letters than Unicode has.
-            known = printable(text, lines=True).encode(encoding, "backslashreplace")
+            known = escape_unprintable(text, lines=True).encode(encoding, "backslashreplace")
             yield Segment(known.decode(encoding), segment.style)

@@ -10,7 +10,7 @@ from collections.abc import Collection, Mapping, Sequence
 from itertools import zip_longest
 from typing import Any
 
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 _GAP = 2
 #: Narrower than this no value is folded.
@@ -39,13 +39,13 @@ def print_table(
     `notes` behind. Without groups, the column `below` may stand in lines below its rows, and the
     columns `right` are flush right.
     """
-    names = [printable(heading) for heading in headings]
-    cells = [[printable(cell) for cell in row] for row in rows]
+    names = [escape_unprintable(heading) for heading in headings]
+    cells = [[escape_unprintable(cell) for cell in row] for row in rows]
     used = [k for k in range(len(names)) if not cells or any(row[k] for row in cells)]
     names, cells = [names[k] for k in used], [[row[k] for k in used] for row in cells]
     group = used.index(group) if group in used and cells else None
     right = [used.index(k) for k in right if k in used]
-    _print_folded(console, printable(title), "italic")
+    _print_folded(console, escape_unprintable(title), "italic")
     if group is None or _total_width(_natural_widths(names, cells)) <= console.width:
         notes_below = [""] * len(cells)
         if below in used and _total_width(_natural_widths(names, cells)) > console.width:
@@ -64,7 +64,7 @@ def print_table(
     for name, some in together.items():
         note = (notes or {}).get(name, "")
         _print(console)
-        _print_folded(console, f"{name}: {printable(note)}" if note else name, "bold cyan")
+        _print_folded(console, f"{name}: {escape_unprintable(note)}" if note else name, "bold cyan")
         used = [k for k in range(len(short)) if any(row[k] for row in some)]
         shown = [[row[k] for k in used] for row in some]
         _print_rows(console, [short[k] for k in used], shown)

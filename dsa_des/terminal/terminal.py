@@ -13,17 +13,17 @@ from typing import Any
 import click
 
 from dsa_des.text.plain_json import json_text
-from dsa_des.text.safe_text import printable
+from dsa_des.text.safe_text import escape_unprintable
 
 
 def say(line: object = "", *, err: bool = False) -> None:
     """Print one line, on standard error with `err`, with control characters escaped."""
-    _write(printable(line), err)
+    _write(escape_unprintable(line), err)
 
 
 def say_lines(text: str, *, err: bool = False) -> None:
     """Print text of several lines; control characters other than line breaks are escaped."""
-    _write(printable(text, lines=True), err)
+    _write(escape_unprintable(text, lines=True), err)
 
 
 def say_json(value: Any) -> None:
@@ -73,7 +73,7 @@ def capture_html(show: Callable[[Any], None]) -> str:
     return plain
 
 
-def progress(text: str) -> Any:
+def progress_bar(text: str) -> Any:
     """Return a ``rich.progress.Progress`` on standard error, gone when it is done.
 
     Behind the bar stand simulated ``"seconds"``, or the task's field ``"text"``.

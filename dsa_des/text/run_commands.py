@@ -6,7 +6,7 @@ from fractions import Fraction
 from typing import Any
 
 
-def run_command(
+def shell_command_of_run(
     scene: str,
     seed: int,
     swaps: Iterable[tuple[str, str]],
@@ -21,7 +21,7 @@ def run_command(
     return shlex.join(words)
 
 
-def format_value(value: Any) -> str:
+def format_set_option_value(value: Any) -> str:
     """Return a value as text in the form that ``--set`` takes."""
     if isinstance(value, Fraction):
         decimal = f"{float(value):.9f}".rstrip("0").rstrip(".")

@@ -1,8 +1,8 @@
 """Text that came from a file, a name, a path or an argument, made fit to be shown.
 
 A terminal obeys control characters: a name can move the cursor, set the window's title or turn
-the text that follows around. `printable` writes each of them as an escape, so that what is shown
-is what is there.
+the text that follows around. `escape_unprintable` writes each of them as an escape, so that what
+is shown is what is there.
 """
 
 import os
@@ -14,7 +14,7 @@ MOST_OF_A_VALUE = 80
 MOST_OF_A_NAME = 60
 
 
-def printable(text: object, *, lines: bool = False) -> str:
+def escape_unprintable(text: object, *, lines: bool = False) -> str:
     r"""Return `text` with every character that is not plainly visible as an escape.
 
     Those are Unicode's categories "other" and "separator" but the blank, as in `str.isprintable`:
@@ -34,7 +34,7 @@ def shorten(text: object, most: int = MOST_OF_A_NAME) -> str:
     """Return printable text of at most `most` characters; an ellipsis stands for what is cut."""
     plain = _text_of(text)
     # What is cut away need not be escaped: one letter becomes one or more.
-    plain = printable(plain[: most + 1])
+    plain = escape_unprintable(plain[: most + 1])
     return plain if len(plain) <= most else plain[: max(0, most - 1)] + "…"
 
 

@@ -76,11 +76,11 @@ class ChangingClock:
         earlier = np.asarray(scans, dtype=np.int64) - 1
         return np.where(earlier < 0, -1, self.ticks(np.maximum(earlier, 0)))
 
-    def next_scan_bound(self, tick: int) -> int:
+    def lower_bound_of_next_scan(self, tick: int) -> int:
         """Return a tick that is no later than any scan at or after `tick`: a lower bound."""
         return tick
 
-    def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
+    def scans_between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         """Return (scan numbers, ticks) of the scans with start <= tick < end, in order."""
         found: list[IntArray] = [np.empty(0, dtype=np.int64)]
         for part, clock in enumerate(self._clocks):

@@ -69,7 +69,7 @@ def common_ticks_per_second(times_s: Iterable[Fraction]) -> int:
     return math.lcm(NANOSECONDS, *(time.denominator for time in times_s))
 
 
-def nanosecond_of(ticks: IntArray, ticks_per_s: int) -> IntArray:
+def ticks_to_nanoseconds(ticks: IntArray, ticks_per_s: int) -> IntArray:
     """Return ticks as whole nanoseconds, which key the random draws of an instant.
 
     A block more or less in a scene may change the resolution; what an instant draws must not.
@@ -95,7 +95,7 @@ class ClockSpec:
         """Nominal time between scans in s."""
         return 1 / self.rate_hz
 
-    def exact_times(self) -> list[Fraction]:
+    def times_needing_whole_ticks(self) -> list[Fraction]:
         """Return the times (s) that must be whole ticks for this clock to be exact."""
         return [self.period_s, self.offset_s]
 
@@ -186,11 +186,11 @@ class ScanClock:
         r, d = self._rest, self._denominator
         return self.offset + scan * self._whole + (2 * scan * r + d) // (2 * d)
 
-    def next_scan_bound(self, tick: int) -> int:
+    def lower_bound_of_next_scan(self, tick: int) -> int:
         """Return a tick that is no later than any scan at or after `tick`: a lower bound."""
         return self._grid_tick(self.first_scan_at_or_after(tick - self._margin)) - self._margin
 
-    def between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
+    def scans_between(self, start: int, end: int) -> tuple[IntArray, IntArray]:
         """Return (scan numbers, ticks) of the scans with start <= tick < end, in order."""
         if end > MAX_TICK:
             raise ValueError(f"end is {end}: ticks must stay below {MAX_TICK} (64 bits)")

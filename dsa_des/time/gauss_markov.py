@@ -112,7 +112,7 @@ class GaussMarkov:
         which on other draws apply.
         """
         if not branches:
-            return self._draw(self._stream.of_runs(runs), who, instants, first)
+            return self._values_from_stream(self._stream.of_runs(runs), who, instants, first)
         begin = self._stream.branch_start_and_stream(runs, branches)[0]
         before = self._values_after_branches(
             branches - 1, who, np.minimum(instants, begin), first, runs
@@ -122,23 +122,27 @@ class GaussMarkov:
             begin, stream = self._stream.branch_start_and_stream(runs[later], branches)
             left = np.exp((begin - instants[later]) / self._tau_ns)
             ends = (instants[later], begin)
-            now, then = (self._draw(stream, who[later], at, first) for at in ends)
+            now, then = (self._values_from_stream(stream, who[later], at, first) for at in ends)
             before[later] = left * before[later] + now - left * then
         return before
 
-    def _draw(self, stream: Stream, who: Any, instants: IntArray, first: int) -> FloatArray:
+    def _values_from_stream(
+        self, stream: Stream, who: Any, instants: IntArray, first: int
+    ) -> FloatArray:
         """Return the process values at the given instants, from the draws of one stream."""
 
-        def drawn(number: IntArray, level: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+        def normals_of_numbers(
+            number: IntArray, level: int
+        ) -> tuple[FloatArray, FloatArray, FloatArray]:
             key = who + (number >> 32).astype(np.uint64) * _SPREAD
-            return stream.normals(key, number & _LOW, first + level)
+            return stream.three_normals(key, number & _LOW, first + level)
 
         step = self._steps
         number = instants >> (2 * step)
-        left, right = drawn(number, 0)[0], drawn(number + 1, 0)[0]
+        left, right = normals_of_numbers(number, 0)[0], normals_of_numbers(number + 1, 0)[0]
         for step in range(self._steps, 0, -1):
             (mean, spread), (mean_of_half, spread_of_half) = self._bridges[step]
-            of_half, of_first, of_second = drawn(instants >> (2 * step), step)
+            of_half, of_first, of_second = normals_of_numbers(instants >> (2 * step), step)
             quarter = (instants >> (2 * step - 2)) & 3
             half = mean * (left + right) + spread * of_half
             later = quarter >= 2

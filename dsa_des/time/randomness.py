@@ -266,7 +266,7 @@ class Stream:
         v = ((w2 >> np.uint64(5)) * 67108864.0 + (w3 >> np.uint64(6))) * 2.0**-53
         return np.sqrt(-2.0 * np.log1p(-u)) * np.cos(2.0 * np.pi * v)
 
-    def normals(
+    def three_normals(
         self, targets: npt.ArrayLike, scans: npt.ArrayLike, draw: int = 0
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return three independent standard normals from each key, for blocks that need many.
@@ -323,7 +323,7 @@ class Streams:
         for (of, _), stream in self._made.items():
             stream.shared = stream.shared or of == block
 
-    def scan_normals(self, block: str, purpose: str) -> Callable[[IntArray], FloatArray]:
+    def scan_normal_function(self, block: str, purpose: str) -> Callable[[IntArray], FloatArray]:
         """Return a function from scan numbers to standard normal draws, for clock jitter."""
         stream = self.stream(block, purpose)
         return lambda scans: stream.normal(np.uint64(0), scans)

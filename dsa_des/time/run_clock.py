@@ -65,7 +65,7 @@ class RunClock:
         """The scan clock of the first run."""
         return self._clocks[0]
 
-    def between(self, start: int, end: int) -> Scans:
+    def scans_between(self, start: int, end: int) -> Scans:
         """Return the scans, with start <= tick < end, of the runs that are being simulated."""
         if self._going != self._runs.going:
             self._going, self._last, self._read = self._runs.going, (0, -1, self._last[2]), _NOTHING
@@ -74,13 +74,13 @@ class RunClock:
             self._last = start, end, self._scans_between(start, min(end, self._runs.run_ticks))
         return self._last[2]
 
-    def next_scan_bound(self, tick: int) -> int:
+    def lower_bound_of_next_scan(self, tick: int) -> int:
         """Return a tick that is no later than any run's scan at or after `tick`: a lower bound."""
         if self._runs.count > 1 and not self._alike_at_once:
             return tick
         # Who asks goes on in time, and what was found holds up to there.
         if not self._none[0] <= tick <= self._none[1]:
-            self._none = tick, self._clocks[0].next_scan_bound(tick)
+            self._none = tick, self._clocks[0].lower_bound_of_next_scan(tick)
         return max(tick, self._none[1])
 
     def previous_ticks(self, scans: IntArray, run: IntArray) -> IntArray:
@@ -95,7 +95,7 @@ class RunClock:
 
     def _scans_between(self, start: int, end: int) -> Scans:
         if self._runs.count == 1:
-            scans, ticks = self._clocks[0].between(start, end)
+            scans, ticks = self._clocks[0].scans_between(start, end)
             return scans, RunTicks.of_run(0, ticks)
         if self._alike:
             return self._scans_between_if_alike(start, end)
@@ -109,7 +109,7 @@ class RunClock:
     def _cache_scans_ahead(self, start: int, end: int) -> None:
         """Compute the scans of all running runs for some time ahead, kept in order of time."""
         until = max(end, min(start + round(_READ_SCANS * self.period), self._runs.run_ticks))
-        scans_of_each = [self._clocks[run].between(start, until) for run in self._going]
+        scans_of_each = [self._clocks[run].scans_between(start, until) for run in self._going]
         ticks = np.concatenate([ticks for _, ticks in scans_of_each])
         runs = np.repeat(np.array(self._going), [len(ticks) for _, ticks in scans_of_each])
         numbers = np.concatenate([scans for scans, _ in scans_of_each])
@@ -120,7 +120,9 @@ class RunClock:
         clock, runs = self._clocks[0], np.array(self._going, dtype=np.int64)
         offsets = self._offsets[runs]
         earliest, latest = int(offsets.min()), int(offsets.max())
-        scans, ticks = clock.between(start + clock.offset - latest, end + clock.offset - earliest)
+        scans, ticks = clock.scans_between(
+            start + clock.offset - latest, end + clock.offset - earliest
+        )
         if not len(ticks):
             return _NONE, RunTicks.empty()
         later = offsets - clock.offset

@@ -6,7 +6,7 @@ from random import Random
 
 import numpy as np
 
-from components.geometry import line_of_sight, sensor_angles, unit_vector
+from components.geometry import body_angles_of_sight_line, line_of_sight, unit_vector
 from components.messages.reach import EVALUATE
 from components.messages.targets import GatedTargets, TrafficStates
 from dsa_des.record.recording import Recorder
@@ -116,7 +116,7 @@ def true_errors(listener: Listener) -> dict[str, float]:
             states.own_pitch_rad[:, None],
             states.own_roll_rad[:, None],
         )
-        p, q = sensor_angles(azimuth, elevation, *attitude)
+        p, q = body_angles_of_sight_line(azimuth, elevation, *attitude)
         looked = np.zeros(range_m.shape, dtype=bool)
         for decision in targets.decisions.values():
             looked[decision.rows] |= decision.reason == EVALUATE

@@ -10,17 +10,17 @@ from hypothesis import strategies as st
 
 from components.geometry import (
     LineOfSight,
+    body_angles_of_sight_line,
     earth_models,
     ellipsoid,
     enu_to_geodetic,
-    sensor_angles,
     unit_vector,
 )
 from components.geometry.error_bounds import (
     Envelope,
     ErrorBound,
-    attitude_error_rad,
-    azimuth_error_rad,
+    attitude_error_bound_rad,
+    azimuth_error_bound_rad,
     error_bound,
 )
 
@@ -174,16 +174,20 @@ def test_attitude_bound_holds_and_is_reached_astern() -> None:
     azimuth, elevation = rng.uniform(-np.pi, np.pi, size), rng.uniform(-1.2, 1.2, size)
     pitch, roll = rng.uniform(-0.3, 0.3, size), rng.uniform(-0.5, 0.5, size)
     true, rough = (
-        np.array(unit_vector(*sensor_angles(azimuth, elevation, 0.0, pitch, roll, model=model)))
+        np.array(
+            unit_vector(
+                *body_angles_of_sight_line(azimuth, elevation, 0.0, pitch, roll, model=model)
+            )
+        )
         for model in ("exact", "small_angle")
     )
     turned = 2 * np.arcsin(np.sqrt(((true - rough) ** 2).sum(axis=0)) / 2)
-    limit = np.array([attitude_error_rad(p, r) for p, r in zip(pitch, roll, strict=True)])
+    limit = np.array([attitude_error_bound_rad(p, r) for p, r in zip(pitch, roll, strict=True)])
     assert np.all(turned <= limit + 1e-12)
     assert np.max(turned / limit) > 0.95
-    q = sensor_angles(np.pi, 0.0, 0.0, 0.1, 0.0)[1]
-    assert q == pytest.approx(0.1) and attitude_error_rad(0.1, 0.0) == pytest.approx(0.2)
-    assert attitude_error_rad(1.0, 3.0) == math.pi
+    q = body_angles_of_sight_line(np.pi, 0.0, 0.0, 0.1, 0.0)[1]
+    assert q == pytest.approx(0.1) and attitude_error_bound_rad(0.1, 0.0) == pytest.approx(0.2)
+    assert attitude_error_bound_rad(1.0, 3.0) == math.pi
     envelope = Envelope(1e3, (10, 10), LOW, LOW, steepest_rad=0.0, pitch_rad=0.1, roll_rad=0.2)
     assert error_bound("ellipsoid", envelope, "small_angle").direction_rad == pytest.approx(0.4)
 
@@ -195,10 +199,10 @@ def test_azimuth_bound_is_reached_and_gives_up_at_the_zenith() -> None:
     # Unit vectors on the circle about (cos q, 0, sin q).
     x = math.cos(e) * math.cos(q) - math.sin(e) * math.sin(q) * np.cos(turn)
     y = math.sin(e) * np.sin(turn)
-    limit = azimuth_error_rad(e, q)
+    limit = azimuth_error_bound_rad(e, q)
     assert np.max(np.abs(np.arctan2(y, x))) == pytest.approx(limit, rel=1e-8)
-    assert azimuth_error_rad(0.05, 0.5 * math.pi - 0.04) == math.pi
-    assert azimuth_error_rad(0.0, 0.5 * math.pi) == 0.0
+    assert azimuth_error_bound_rad(0.05, 0.5 * math.pi - 0.04) == math.pi
+    assert azimuth_error_bound_rad(0.0, 0.5 * math.pi) == 0.0
 
 
 @pytest.mark.parametrize(

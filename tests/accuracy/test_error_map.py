@@ -8,7 +8,12 @@ import numpy as np
 import pytest
 
 from components.geometry.error_bounds import Envelope, error_bound
-from components.line_of_sight.error_map import ALTITUDE_M, ErrorMap, draw_error_map, error_maps
+from components.line_of_sight.error_map import (
+    ALTITUDE_M,
+    ErrorMap,
+    draw_error_map,
+    error_maps_of_earth_models,
+)
 
 LAT = np.array([0.0, 15.0, 30.0, 45.0, 60.0, 75.0, 89.99])
 RANGE = np.array([1e3, 2e3, 4e3, 8e3, 16e3, 32e3])
@@ -23,7 +28,7 @@ TURN_DEG = np.degrees(np.arcsin((SCALES[0] / SCALES[1] - 1.0) / (SCALES[0] / SCA
 
 @cache
 def maps() -> dict[str, ErrorMap]:
-    return {found.model: found for found in error_maps(LAT, RANGE)}
+    return {found.model: found for found in error_maps_of_earth_models(LAT, RANGE)}
 
 
 @pytest.mark.parametrize("model", ["flat_earth", "local_radii"])

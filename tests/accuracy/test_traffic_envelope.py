@@ -11,7 +11,7 @@ from components.flights.legs import Climb, Straight, Turn
 from components.flights.sampled_flight import SampledFleet, SampledTrajectory
 from components.flights.scripted_flights import ScriptedFleet, ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-from components.messages.reach import FarthestLook, Reach, farthest_look
+from components.messages.reach import FarthestLook, Reach, combined_farthest_look
 from components.sensor.mounting import SensorAxes
 
 
@@ -95,19 +95,19 @@ def test_requests_add_up_and_the_silent_want_everything() -> None:
     near = Reach((-1, 1), (-0.2, 0.3), 5000.0, range_slack=0.01)
     wide = Reach((-1, 1), (-0.9, 0.1), 2000.0, exact_because="rates")
     off = Reach((-1, 1), (-1.5, 1.5), 9e9, enabled=False)
-    assert farthest_look([near, wide, off]) == FarthestLook(
+    assert combined_farthest_look([near, wide, off]) == FarthestLook(
         5000.0, ((2000.0, 0.9), (5000.0, 0.3)), 0.01, "rates"
     )
-    assert farthest_look([near, None]).views[-1] == (math.inf, 0.5 * math.pi)
+    assert combined_farthest_look([near, None]).views[-1] == (math.inf, 0.5 * math.pi)
 
 
 def test_a_tilted_sensor_sees_steeper_body_elevations() -> None:
     level = Reach((-1, 1), (-0.2, 0.3), 5000.0)
     turned = SensorAxes((1.0, 0.0, 0.0), (1.0, 0.0, 0.0)).reach_in_body_axes(level)
-    assert turned.steepest_rad == pytest.approx(0.3)
+    assert turned.steepest_elevation_rad == pytest.approx(0.3)
     tilted = SensorAxes((0.0, 0.4, 0.0), (0.0, 0.4, 0.0))
-    _, elevation = tilted.to_body(np.linspace(-1, 1, 201), np.full(201, 0.3))
-    steepest_rad = tilted.reach_in_body_axes(level).steepest_rad
+    _, elevation = tilted.believed_direction_in_body(np.linspace(-1, 1, 201), np.full(201, 0.3))
+    steepest_rad = tilted.reach_in_body_axes(level).steepest_elevation_rad
     assert np.abs(elevation).max() <= steepest_rad + 1e-15 and steepest_rad == pytest.approx(0.7)
 
 

@@ -14,7 +14,7 @@ from wired import Row, chain, decided, rows, run, sensor
 
 import dsa_des
 from components.encounters.encounter_traffic import MadeTogether
-from components.formats.asterix_records import ADS_B, AsterixRecord, write_records
+from components.formats.asterix_records import ADS_B, AsterixRecord, encode_records
 from components.formats.csv_file import read_csv
 from components.formats.set_file import read_set
 from dsa_des.running.reports import notes_of_scene
@@ -87,7 +87,7 @@ def asterix_any(craft: dict, folder) -> dict:
         for number, flight in enumerate(flights)
         for time_s in flight.sample_times_s.tolist()
     ]  # fmt: skip
-    (folder / "f.ast").write_bytes(write_records(records))
+    (folder / "f.ast").write_bytes(encode_records(records))
     return {"type": "traffic.asterix", "file": str(folder / "f.ast"), "intruder": craft}
 
 

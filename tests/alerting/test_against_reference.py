@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.alert_tables import alert_table, remove_hysteresis
+from components.alerting.alert_tables import alert_table_csv, remove_hysteresis
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import alert_levels
 from components.arguments.units import FOOT_M
-from components.well_clear.tcas import tcas_span
+from components.well_clear.tcas import tcas_advisory_span
 from tests.alerting.reference_data import reference_file, reference_text, rows
 
 TIMES = slice(5, 8)
@@ -29,7 +29,7 @@ def differences(configuration, path, wanted, decimals):
         encounter.pairs,
         encounter.alerter,
     )
-    table = alert_table(configuration, encounter, found, decimals)
+    table = alert_table_csv(configuration, encounter, found, decimals)
     assert table.splitlines()[:2] == wanted.splitlines()[:2]
     got, want = rows(table)[2:], rows(wanted)[2:]
     assert [row[:5] for row in got] == [row[:5] for row in want]
@@ -73,7 +73,9 @@ def test_tcas_advisories(resolution, tmp_path):
     lines = rows(path.read_text(encoding="utf-8"))[2::2]
     altitude_m, climb_mps = (np.array([float(r[i]) for r in lines]) * FOOT_M for i in (3, 6))
     relative = tuple(part[:, 0] for part in encounter.relative)
-    found = tcas_span(relative, altitude_m, climb_mps / 60.0, resolution=resolution, end_s=60.0)
+    found = tcas_advisory_span(
+        relative, altitude_m, climb_mps / 60.0, resolution=resolution, end_s=60.0
+    )
     want = np.array([float(row[5 + resolution].replace("infty", "inf")) for row in wanted])
     assert (np.isinf(want) == np.isinf(found.begin_s)).all()
     met = np.isfinite(want)

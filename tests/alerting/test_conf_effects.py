@@ -12,14 +12,14 @@ import pytest
 from click.testing import CliRunner
 
 from components.alert_configuration.conf_file import read_conf
-from components.alerting.alert_tables import alert_table, bands_table
+from components.alerting.alert_tables import alert_table_csv, bands_table_csv
 from components.alerting.command import alert
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels
 from components.formats.text_rows import TrafficFileError
 from components.guidance.bands import GuidedIntruder, guidance
 from components.guidance.situation import State
-from components.well_clear.tcas import recovery_sizes_m
+from components.well_clear.tcas import recovery_cylinder_sizes_m
 from tests.alerting.reference_data import reference_text, rows
 
 D_M, Z_M, SOON_S = 700.0, 150.0, 45.0
@@ -131,7 +131,7 @@ def test_wind_shifts_bands_and_not_levels(tmp_path):
     path.write_text(XYZ, encoding="utf-8")
     encounter = read_encounter(path, configuration)
     alerts = alert_levels(configuration, encounter.time_s, encounter.present, encounter.pairs)
-    bands = csv.DictReader(io.StringIO(bands_table(configuration, encounter, alerts, 9)))
+    bands = csv.DictReader(io.StringIO(bands_table_csv(configuration, encounter, alerts, 9)))
     red = [b for b in bands if b["kind"] == "hdir" and b["region"] == "NEAR"]
     assert len(red) == 1
     wind = np.subtract(velocity(217.0, 60.0), velocity(200.0, 55.0))
@@ -146,10 +146,10 @@ def test_wind_shifts_bands_and_not_levels(tmp_path):
     assert float(red[0]["up"]) == pytest.approx(last + 1, abs=1e-6)
     calm = read_encounter(path, configuration, (0.0, 0.0))
     without = alert_levels(configuration, calm.time_s, calm.present, calm.pairs)
-    assert alert_table(configuration, calm, without) == alert_table(
+    assert alert_table_csv(configuration, calm, without) == alert_table_csv(
         configuration, encounter, alerts
     )
-    shifted = csv.DictReader(io.StringIO(bands_table(configuration, calm, without, 9)))
+    shifted = csv.DictReader(io.StringIO(bands_table_csv(configuration, calm, without, 9)))
     moved = [b for b in shifted if b["kind"] == "hdir" and b["region"] == "NEAR"]
     assert abs(float(moved[0]["low"]) - first) > 5.0
 
@@ -176,7 +176,7 @@ def test_levels_of_tcas(tmp_path):
     path.write_text(reference_text("alerting/random_states.xyz.gz"), encoding="utf-8")
     encounter = read_encounter(path, configuration)
     alerts = alert_levels(configuration, encounter.time_s, encounter.present, encounter.pairs)
-    got = rows(alert_table(configuration, encounter, alerts, 12))
+    got = rows(alert_table_csv(configuration, encounter, alerts, 12))
     want = rows(reference_text("alerting/random_states_tcas.csv.gz"))
     assert got[0] == want[0] and len(got) == len(want)
     for one, other in zip(got[2:], want[2:], strict=True):
@@ -270,7 +270,7 @@ def test_releases_that_are_not_known_are_refused(tmp_path, lines, said):
 
 def test_recovery_sizes_of_zero_are_those_of_tcas(tmp_path):
     """Level 3 at least, and by the ownship's altitude: Table of the Federal Aviation booklet."""
-    radius, half = recovery_sizes_m(np.array([200.0, 1500.0, 12801.6, 12802.0]))
+    radius, half = recovery_cylinder_sizes_m(np.array([200.0, 1500.0, 12801.6, 12802.0]))
     assert radius / 0.3048 == pytest.approx([1215.0, 2126.0, 6683.0, 6683.0])
     assert half / 0.3048 == pytest.approx([600.0, 600.0, 700.0, 800.0])
     configuration = conf(tmp_path, CONF)

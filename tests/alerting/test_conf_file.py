@@ -44,7 +44,7 @@ def test_names_units_and_defaults(tmp_path):
     assert found["turn_rate"] == pytest.approx(math.radians(3))
     assert found["vertical_accel"] == pytest.approx(0.25 * 9.80665)
     assert found["min_vs"] == pytest.approx(-6000 * 0.3048 / 60)
-    assert found.corrective_level(first) is far
+    assert found.first_corrective_level(first) is far
 
 
 def test_keys_are_read_in_any_case_and_order(tmp_path):

@@ -16,11 +16,11 @@ class Remembering:
         self.memory = AlertMemory.new(rule, 0 * targets, targets)
 
     def step(self, *now):
-        self.memory, level = self.memory.step(self.rule, *now)
+        self.memory, level = self.memory.next_memory_and_levels(self.rule, *now)
         return level
 
     def early_levels(self, now_s, present):
-        return self.memory.early_levels(self.rule, now_s, present)
+        return self.memory.early_levels_for_guidance(self.rule, now_s, present)
 
 
 def levels(rule, raw, times=None):

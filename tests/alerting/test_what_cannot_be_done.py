@@ -13,7 +13,7 @@ from wired import SEES_ALL, chain
 import dsa_des
 from components.display.terminal import print_run_summary
 from dsa_des.cli import main
-from dsa_des.record.failure_counts import add_counts, failure_sentences
+from dsa_des.record.failure_counts import failure_sentences, sum_failure_counts
 from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -114,7 +114,7 @@ def test_what_has_no_range_is_counted(tmp_path: Path, tracker: str | None, sourc
     # In lock step each run counts, as often as by itself: of a shared block and of a split one.
     for change in ({}, {"blocks.alerting.fit_s": 2.0}):
         scenes = replicas_of(dsa_des.load_scene(eyes), {}, change)
-        assert make_lockstep_simulation(scenes).run().failure_counts == add_counts(
+        assert make_lockstep_simulation(scenes).run().failure_counts == sum_failure_counts(
             map(failure_counts, scenes)
         )
 
@@ -195,7 +195,7 @@ def test_a_study_says_it_of_all_its_runs(tmp_path: Path, monkeypatch: Any) -> No
 
 
 def test_counts_of_runs_add_up() -> None:
-    found = add_counts([{"a": {"x": (1, 4)}}, {"a": {"x": (0, 6), "y": (1, 1)}, "b": {}}])
+    found = sum_failure_counts([{"a": {"x": (1, 4)}}, {"a": {"x": (0, 6), "y": (1, 1)}, "b": {}}])
     assert found == {"a": {"x": (1, 10), "y": (1, 1)}}
     assert failure_sentences(found) == ["a: x: 1 of 10 (10 %)", "a: y: 1 of 1 (100 %)"]
     assert failure_sentences({"a": {"x": (1, 11), "y": (9999, 10000)}}) == [

@@ -81,10 +81,12 @@ def test_no_run_with_both_values_has_no_difference() -> None:
 def test_what_is_the_same_to_the_last_bit_is_identical_and_a_rounding_is_not() -> None:
     values = [100.0 + k for k in range(20)] + [NAN]
     same = change_of(RANGE, ranges(values), ranges(values))
-    assert same.identical and same.largest_possible_change == 0.0 and same.neither == 1
+    assert (
+        same.has_only_identical_runs and same.largest_possible_change == 0.0 and same.neither == 1
+    )
     near = [*values[:-2], math.nextafter(values[-2], math.inf), NAN]
     almost = change_of(RANGE, ranges(values), ranges(near))
-    assert not almost.identical and almost.differing == 1
+    assert not almost.has_only_identical_runs and almost.differing == 1
     assert almost.difference.value == 0.0  # as everywhere, within 1e-9
 
 
@@ -123,7 +125,7 @@ def test_without_an_event_there_is_no_ratio_and_with_one_it_rests_on_few() -> No
 
 def test_events_that_all_agree_have_no_point_for_an_interval() -> None:
     change = change_of(EVENTS, {"lost": [0.0] * 40}, {"lost": [0.0] * 40})
-    assert change.identical and change.difference.value == 0.0
+    assert change.has_only_identical_runs and change.difference.value == 0.0
     assert (
         change.largest_possible_change == pytest.approx(change.difference.high)
         and change.largest_possible_change > 0.05

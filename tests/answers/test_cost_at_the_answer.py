@@ -13,7 +13,7 @@ from scipy import stats
 
 from dsa_des.cli import main
 from dsa_des.commands import cost_answer
-from dsa_des.record.drawing import keep_figures
+from dsa_des.record.drawing import collect_drawn_figures
 
 STUDY = """
 title = "A head-on intruder, seen by a radar"
@@ -47,7 +47,7 @@ def study(tmp_path_factory):
 @pytest.fixture(scope="module")
 def made(study, tmp_path_factory):
     out = tmp_path_factory.mktemp("cost") / "out"
-    with keep_figures() as figures:
+    with collect_drawn_figures() as figures:
         done = call(
             "cost", study, "--answer", RANGE, "--answer", "declared.radar", "--block", "radar",
             "--vary", "blocks.radar.scan_rate_hz=[2, 5]",
@@ -198,15 +198,15 @@ def test_any_number_of_workers_gives_the_same(study, tmp_path):
 
 
 def test_ctrl_c_keeps_the_turns_that_are_finished(study, made, tmp_path, monkeypatch):
-    told = cost_answer.AnswerOfStudy.done_text
+    told = cost_answer.AnswerOfStudy.finished_turns_text
 
     def interrupted(self):
         if self.turn_times.runs and max(turn for turn, _ in self.turn_times.runs) == 1:
-            monkeypatch.setattr(cost_answer.AnswerOfStudy, "done_text", told)
+            monkeypatch.setattr(cost_answer.AnswerOfStudy, "finished_turns_text", told)
             raise KeyboardInterrupt
         return told(self)
 
-    monkeypatch.setattr(cost_answer.AnswerOfStudy, "done_text", interrupted)
+    monkeypatch.setattr(cost_answer.AnswerOfStudy, "finished_turns_text", interrupted)
     out = tmp_path / "out"
     done = call("cost", study, "--answer", RANGE, "--block", "radar", "--repeats", "4",
                 "--workers", "1", "--out", out)  # fmt: skip

@@ -13,8 +13,8 @@ from dsa_des.answers.verdicts import (
     SAME,
     WITHIN,
     Limit,
-    is_on_cost_front,
-    judge_model,
+    flag_verdicts_on_cost_front,
+    judge_by_worst_change,
     parse_limits,
 )
 from dsa_des.errors import UsageError
@@ -42,7 +42,7 @@ HUNDRED = Limit(100.0, False)
 
 
 def kind_of(*changes, limit=HUNDRED, result=RANGE):
-    return judge_model("other", result, changes, limit, "")
+    return judge_by_worst_change("other", result, changes, limit, "")
 
 
 @pytest.mark.parametrize(
@@ -121,17 +121,22 @@ def test_what_cannot_be_compared_says_why():
     nothing = change(math.nan, math.nan, reason="no encounter has a nominal event")
     assert kind_of(nothing).kind == NOTHING
     assert kind_of(nothing).reason == "no encounter has a nominal event"
-    assert judge_model("other", RANGE, [], Limit(1.0, False), "it broke").reason == "it broke"
+    assert (
+        judge_by_worst_change("other", RANGE, [], Limit(1.0, False), "it broke").reason
+        == "it broke"
+    )
 
 
 def test_the_front_holds_what_is_cheaper_or_surely_nearer():
     verdicts = [
-        judge_model(name, RANGE, [change(-size, size, value=0.0)], Limit(100.0, False), "")
+        judge_by_worst_change(
+            name, RANGE, [change(-size, size, value=0.0)], Limit(100.0, False), ""
+        )
         for name, size in (("cheap", 80.0), ("cheaper", 20.0), ("near", 5.0), ("dear", 1.0))
     ]
     costs = {"cheap": 0.5, "cheaper": 0.4, "near": 0.8, "dear": 1.05}
     # The scene as it is changes nothing and costs as much as the last one.
-    assert is_on_cost_front(verdicts, costs) == [False, True, True, False]
+    assert flag_verdicts_on_cost_front(verdicts, costs) == [False, True, True, False]
 
 
 def test_limits_have_the_unit_of_a_result_or_are_shares():

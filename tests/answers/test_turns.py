@@ -66,8 +66,8 @@ def test_a_time_is_taken_by_that_of_the_same_turn():
     for turn, slow in enumerate((1.0, 2.0, 1.0)):
         for model, cpu_s in enumerate((1.0, 0.5, 3.0)):
             times.cpu_s[turn, model], times.runs[turn, model] = slow * cpu_s, 10
-    assert times.cpu_ratio_to_own(1) == (0.5, 0.0)
-    assert times.cpu_ratio_to_own(2) == pytest.approx((3.0, 0.0))
-    assert times.cpu_ms_per_run(0)[0] == 100.0
+    assert times.relative_cpu_and_spread(1) == (0.5, 0.0)
+    assert times.relative_cpu_and_spread(2) == pytest.approx((3.0, 0.0))
+    assert times.run_cpu_ms_and_spread(0)[0] == 100.0
     del times.cpu_s[1, 0]  # interrupted: that turn has nothing to be held against
-    assert times.cpu_ratio_to_own(1) == (0.5, 0.0)
+    assert times.relative_cpu_and_spread(1) == (0.5, 0.0)

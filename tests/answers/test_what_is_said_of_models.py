@@ -35,7 +35,7 @@ def report() -> AnswerReport:
 
 
 def test_the_sentences_decide_first_and_name_everyone(report: AnswerReport) -> None:
-    assert report.sentences("range_m") == [
+    assert report.conclusion_sentences("range_m") == [
         "With the scene as it is range_m, m, is 1000 (1000 to 1000), of 60 replicas.",
         "May be taken without changing it by more than 10 % of it (100 m), 95 % sure of all, each "
         "alone: 2 of 5 models.",
@@ -84,14 +84,14 @@ def test_a_page_says_what_the_command_says(report: AnswerReport) -> None:
     asked = AskedStudy("Ranges", "mine", ("range_m",), ("replicas=60",), budgets=("10%",))
     page = section([report], [asked])
     assert "`dsa-des cost mine --answer range_m --set replicas=60 --budget 10%`" in page
-    first, *said = report.sentences("range_m")
+    first, *said = report.conclusion_sentences("range_m")
     # Which may be taken, the cheapest and those that change it stand in the head and in the table,
     # and those with which no run differs in a line of its own.
     shown = [one for one in said if one not in page]
     assert [one.split()[0] for one in shown] == ["May", "The", "Within", "The", "Surely"]
     assert first in page and all(sentence in page for sentence in report.notes_on_tables())
     assert "| near | 0.5 | 5 | -5 to 15 | 60 of 60 | within, front |" in page
-    decision = " ".join(report.sentences("range_m")[1:3]).partition(" Front,")[0]
+    decision = " ".join(report.conclusion_sentences("range_m")[1:3]).partition(" Front,")[0]
     assert head([report], [asked]) == f"- **Ranges**, `range_m`. {decision}"
 
 
@@ -99,5 +99,5 @@ def test_where_nothing_is_near_enough_that_is_said(report: AnswerReport) -> None
     report.limits["range_m"] = Limit(1e-6, False)
     report.changes = [one for one in report.changes if one.model != "twin"]
     report.__post_init__()
-    said = report.sentences("range_m")
+    said = report.conclusion_sentences("range_m")
     assert said[1] == "No model is surely within 1e-06 m."

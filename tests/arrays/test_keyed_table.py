@@ -35,7 +35,7 @@ def test_what_is_kept_is_what_a_table_of_each_run_keeps(seed):
         new = {run: [(run, k, int(dice.integers(99))) for k in range(dice.integers(4))]
                for run in runs.tolist()}  # fmt: skip
         rows = [row for run in runs.tolist() for row in new[run]]
-        table = table.replace_runs(runs, a_table(rows), first_run)
+        table = table.replace_and_drop_earlier_runs(runs, a_table(rows), first_run)
         apart = {run: rows for run, rows in {**apart, **new}.items() if run >= first_run}
         kept = [row for row in rows_of(table) if row[0] >= first_run]
         assert kept == [row for run in sorted(apart) for row in apart[run]]

@@ -12,7 +12,7 @@ from dsa_des.arrays.run_ticks import (
     is_shared_single_run,
     last_position_at_or_before,
     rank_instants,
-    single_run_numbers,
+    shared_zero_run_numbers,
     union_of_instants,
 )
 
@@ -47,7 +47,9 @@ def test_the_first_at_or_after(known, asked, scale):
     assert rows.tolist() == [sum(one < pair for one in known) for pair in asked]
     of_run = first_position_in_runs(instants, np.array([run for run, _ in asked], dtype=np.int64))
     assert of_run.tolist() == [sum(one[0] < run for one in known) for run, _ in asked]
-    assert [instants.count_before(run, tick * scale) for run, tick in asked] == rows.tolist()
+    assert [
+        instants.count_before_run_tick(run, tick * scale) for run, tick in asked
+    ] == rows.tolist()
 
 
 @settings(derandomize=True, deadline=None, max_examples=200)
@@ -72,7 +74,7 @@ def test_union_order_and_ranks(parts, scale):
 @given(scale=scales, found=pairs)
 def test_the_newest_so_far_of_each_run(found, scale):
     found = sorted(found, key=lambda pair: pair[0])
-    newest = of(found, scale).running_latest()
+    newest = of(found, scale).running_largest_tick()
     for k, (run, _) in enumerate(found):
         so_far = max(t for other, t in found[: k + 1] if other == run)
         assert newest.tick[k] == scale * so_far
@@ -96,4 +98,4 @@ def test_a_single_run_needs_no_column(rows):
     joined = RunTicks.concatenate([instants, instants])
     assert is_shared_single_run(joined.run) and joined.run.tolist() == [0] * 6
     assert not is_shared_single_run(RunTicks.of_run(2, np.array([4])).run)
-    assert single_run_numbers(0).tolist() == []
+    assert shared_zero_run_numbers(0).tolist() == []

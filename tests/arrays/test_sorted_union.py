@@ -7,10 +7,10 @@ from dsa_des.arrays.run_ticks import (
     RunTicks,
     last_position_at_or_before,
     positions_with_found_mask,
-    single_run_numbers,
+    shared_zero_run_numbers,
     union_of_instants,
 )
-from dsa_des.arrays.sorted_union import sorted_union
+from dsa_des.arrays.sorted_union import sorted_union_and_positions
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -19,14 +19,14 @@ def test_every_value_once_and_where_it_lies(seed: int) -> None:
     for lengths in ((5,), (0, 0), (4, 0, 7), (30, 20, 10)):
         # A radar with cells reports targets in no order, and may be the only one that reports.
         parts = [random.integers(0, 25, length) for length in lengths]
-        values, places = sorted_union(parts)
+        values, places = sorted_union_and_positions(parts)
         assert values.tolist() == sorted({int(one) for part in parts for one in part})
         assert [values[place].tolist() for place in places] == [part.tolist() for part in parts]
 
 
 @pytest.mark.parametrize("parts", [[7], [7, 7], [7, 7, 7], [7, 7, 5]])
 def test_single_values_alike_are_one(parts: list[int]) -> None:
-    values, places = sorted_union([np.array([part]) for part in parts])
+    values, places = sorted_union_and_positions([np.array([part]) for part in parts])
     assert values.tolist() == sorted(set(parts)) and values.dtype == np.int64
     assert [values[place].tolist() for place in places] == [[part] for part in parts]
 
@@ -40,7 +40,7 @@ def test_a_union_knows_its_parts_and_no_others(runs: int) -> None:
             run = np.sort(random.integers(0, runs, 40))
             tick = random.integers(0, 60, 40)
             order = np.lexsort((tick, run))
-            known = RunTicks(single_run_numbers(40) if runs == 1 else run, tick[order])
+            known = RunTicks(shared_zero_run_numbers(40) if runs == 1 else run, tick[order])
             parts.append(known)
         every = union_of_instants(parts)
         pairs = list(zip(every.run.tolist(), every.tick.tolist(), strict=True))

@@ -6,8 +6,16 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from components.association.assignment import gate_threshold, global_nearest_pairs, nearest_pairs
-from components.association.jpda import exact_marginals, marginals, propagate_beliefs
+from components.association.assignment import (
+    greedy_pair_indices,
+    least_total_pair_indices,
+    squared_gate_distance,
+)
+from components.association.jpda import (
+    approximate_pair_probabilities,
+    exact_pair_probabilities,
+    pair_probabilities,
+)
 
 
 def events(tracks, detections):
@@ -32,13 +40,15 @@ def enumerated(weights):
 @pytest.mark.parametrize("probability", [0.9, 0.997])
 def test_gates_hold_their_probability(probability):
     for size in (1, 2, 3, 4, 5):
-        assert chi2.cdf(gate_threshold(probability, size), size) == pytest.approx(probability)
+        assert chi2.cdf(squared_gate_distance(probability, size), size) == pytest.approx(
+            probability
+        )
 
 
 def test_the_textbook_s_two_targets():
     """Two tracks that see both detections alike: seven joint events, three of them a miss."""
     track, detection = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
-    found = marginals(track, detection, np.ones(4))
+    found = pair_probabilities(track, detection, np.ones(4))
     np.testing.assert_allclose(found, 2 / 7)
     assert round(1 - found[:2].sum(), 4) == 0.4286
 
@@ -49,7 +59,7 @@ def test_exact_marginals_are_those_of_enumeration():
         weights = 10.0 ** rng.uniform(-3, 5, (tracks, detections))
         weights[rng.uniform(size=weights.shape) < 0.3] = 0.0
         np.testing.assert_allclose(
-            exact_marginals(weights), enumerated(weights), rtol=1e-12, atol=1e-300
+            exact_pair_probabilities(weights), enumerated(weights), rtol=1e-12, atol=1e-300
         )
 
 
@@ -63,17 +73,19 @@ def test_many_clusters_together_are_each_decided_alone():
         track += (3 * cluster + t).tolist()
         detection += (3 * cluster + d).tolist()
         weight += weights[weights > 0].tolist()
-    found = marginals(np.array(track), np.array(detection), np.array(weight))
+    found = pair_probabilities(np.array(track), np.array(detection), np.array(weight))
     np.testing.assert_allclose(found, known, rtol=1e-12)
 
 
 def test_propagation_is_close_and_exact_where_nothing_is_shared():
     rng = np.random.default_rng(9)
     single = 10.0 ** rng.uniform(-1, 3, (1, 6))
-    np.testing.assert_allclose(propagate_beliefs(single), exact_marginals(single), rtol=1e-9)
+    np.testing.assert_allclose(
+        approximate_pair_probabilities(single), exact_pair_probabilities(single), rtol=1e-9
+    )
     for _ in range(20):
         weights = 10.0 ** rng.uniform(-1, 2, (4, 5)) * (rng.uniform(size=(4, 5)) < 0.5)
-        assert np.abs(propagate_beliefs(weights) - enumerated(weights)).max() < 0.1
+        assert np.abs(approximate_pair_probabilities(weights) - enumerated(weights)).max() < 0.1
 
 
 def best(tracks, detections, cost, missing):
@@ -97,7 +109,7 @@ def test_the_global_assignment_costs_least_and_the_nearest_goes_in_turn():
         }
         track, detection = (np.array([k[i] for k in cost], dtype=int) for i in (0, 1))
         distance = np.array(list(cost.values()))
-        taken = global_nearest_pairs(track, detection, distance, gate)
+        taken = least_total_pair_indices(track, detection, distance, gate)
         assert len(set(track[taken])) == len(set(detection[taken])) == len(taken)
         total = distance[taken].sum() + gate * (tracks - len(taken))
         assert total == pytest.approx(best(tracks, detections, cost, gate))
@@ -106,7 +118,7 @@ def test_the_global_assignment_costs_least_and_the_nearest_goes_in_turn():
             if ("t", pair[0]) not in used and ("d", pair[1]) not in used:
                 near.append(pair)
                 used |= {("t", pair[0]), ("d", pair[1])}
-        got = nearest_pairs(track, detection, distance)
+        got = greedy_pair_indices(track, detection, distance)
         assert sorted(zip(track[got], detection[got], strict=True)) == sorted(near)
         greedy_lost += distance[got].sum() + gate * (tracks - len(got)) > total + 1e-9
     assert greedy_lost > 0
@@ -121,7 +133,7 @@ def test_the_global_assignment_lives_with_costs_below_zero():
             continue
         cost = rng.uniform(0.0, 9.0, len(track)) - 28.0
         price = 11.0 - 28.0
-        taken = global_nearest_pairs(track, detection, cost, price)
+        taken = least_total_pair_indices(track, detection, cost, price)
         assert len(set(track[taken])) == len(set(detection[taken])) == len(taken)
         total = cost[taken].sum() + price * (len(set(track)) - len(taken))
         known = dict(zip(zip(track.tolist(), detection.tolist(), strict=True), cost, strict=True))
@@ -136,4 +148,4 @@ def test_a_wide_gate_takes_no_detection_from_a_narrow_one():
     track, detection = np.array([wide, narrow]), np.array([0, 0])
     cost = np.array([1.0 + 6.0, 2.0 - 6.0])  # squared distance and ln|S|
     price = np.array([9.0 + 6.0, 9.0 - 6.0])  # the gate and ln|S|
-    assert track[global_nearest_pairs(track, detection, cost, price)].tolist() == [narrow]
+    assert track[least_total_pair_indices(track, detection, cost, price)].tolist() == [narrow]

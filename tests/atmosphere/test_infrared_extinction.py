@@ -9,7 +9,7 @@ import pytest
 from components.atmosphere.infrared import (
     band_extinction_per_m,
     band_wavelengths_um,
-    continuum_per_km,
+    continuum_absorption_per_km,
     haze_extinction_ratio,
     long_wave_transmission,
     mid_wave_transmission,
@@ -46,11 +46,11 @@ def test_continuum_by_hand_and_with_the_square_of_humidity():
     strength = 4.18 + 5578 * math.exp(-7.87e-3 * 1000)
     strength *= math.exp(1800 * (1 / 288.15 - 1 / 296))
     expected = strength * 0.75 * (pressure + 0.002 * (1 - pressure))
-    found = float(continuum_per_km(10.0, vapour_density_g_m3=7.5))
+    found = float(continuum_absorption_per_km(10.0, vapour_density_g_m3=7.5))
     assert found == pytest.approx(expected, rel=1e-12) and 0.06 < found < 0.07
-    humid = float(continuum_per_km(10.0, vapour_density_g_m3=15.0))
+    humid = float(continuum_absorption_per_km(10.0, vapour_density_g_m3=15.0))
     assert 3.4 < humid / found < 4.0
-    assert float(continuum_per_km(10.0, vapour_density_g_m3=0.0)) == 0.0
+    assert float(continuum_absorption_per_km(10.0, vapour_density_g_m3=0.0)) == 0.0
 
 
 @pytest.mark.parametrize(("own", "target", "range_m"), [(300.0, 300.0, 5e3), (200.0, 5200.0, 12e3)])
@@ -62,7 +62,7 @@ def test_long_wave_is_the_mean_over_path_and_band(own, target, range_m):
     pressure = 1013.25 * (temperature / 288.15) ** 5.2559
     depth = np.mean(
         [
-            continuum_per_km(
+            continuum_absorption_per_km(
                 wavelengths, vapour_density_g_m3=12.0 * math.exp(-h / 2000), temperature_k=t,
                 pressure_hpa=p,
             )

@@ -52,7 +52,7 @@ def test_an_altimeter_reads_the_standard_height_of_the_pressure_there(qnh_hpa, o
     for height_m, altitude in zip(heights, air.pressure_altitude_m(heights + 47.0), strict=True):
         there = pressure_hpa(height_m, qnh_hpa, **of)
         assert pressure_hpa(altitude, 1013.25) == pytest.approx(there, rel=1e-6)
-    back_m = air.height_m(air.pressure_altitude_m(heights + 47.0))
+    back_m = air.height_of_pressure_altitude_m(air.pressure_altitude_m(heights + 47.0))
     assert back_m == pytest.approx(heights + 47.0, abs=1e-6)
 
 
@@ -66,7 +66,9 @@ def test_one_row_of_a_profile_is_an_offset_and_the_standards_own_rows_are_no_cha
 
 def test_the_standard_atmosphere_is_no_air_of_a_scene():
     heights = np.array([0.1, 123.456, 7891.234, 14_000.7])
-    assert Air(geoid_m=30.0).height_m(heights) == pytest.approx(heights + 30.0, abs=1e-8)
+    assert Air(geoid_m=30.0).height_of_pressure_altitude_m(heights) == pytest.approx(
+        heights + 30.0, abs=1e-8
+    )
     assert Air(geoid_m=30.0).pressure_altitude_m(heights) == pytest.approx(heights - 30.0, abs=1e-8)
     assert scene_air({}) is scene_air({"weather": Weather(), "terrain": Terrain()}) is None
     assert scene_air({"weather": Weather(qnh_hpa=993)}) == Air(993)
@@ -76,4 +78,4 @@ def test_heights_are_refused_where_they_are_wrong():
     with pytest.raises(ValueError, match="height_m"):
         Air().pressure_altitude_m(31_000)
     with pytest.raises(ValueError, match="altitude_m"):
-        Air(993).height_m(np.nan)
+        Air(993).height_of_pressure_altitude_m(np.nan)

@@ -20,7 +20,7 @@ from components.atmosphere.visibility import (
     fog_visibility_m,
     rain_visibility_m,
 )
-from components.navigation.errors import displaced_position
+from components.navigation.errors import displaced_lat_lon_alt
 from components.optical.detection import detection_probability, false_alarm_direction
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
@@ -98,7 +98,7 @@ CASES = {
         lowest_elevation_rad=-0.3,
         highest_elevation_rad=0.1,
     )[0],
-    "position": lambda a, b, c: displaced_position(
+    "position": lambda a, b, c: displaced_lat_lon_alt(
         180 * a - 90, 9.0, 100.0, 9.0 * b, 7.0 * c, 3.0 * b
     )[1],
 }

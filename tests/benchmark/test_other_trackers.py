@@ -5,7 +5,7 @@ import pytest
 
 from components.benchmark.track_updates import (
     LOOKS,
-    _recorded_scans,
+    _recorded_scans_and_poses,
     _start_tracks,
     plain_looks,
     prepare_plain_updates,
@@ -18,7 +18,7 @@ from components.messages.state_tracks import COVARIANCE
 
 def test_the_plain_loop_comes_to_the_states_of_our_tracker():
     block = record_tracker_inputs(1, 4)
-    scans, places = _recorded_scans(block)
+    scans, places = _recorded_scans_and_poses(block)
     looks = plain_looks(scans, places, block.context.ticks_per_s)
     assert sorted({look.measured.shape[1] for look in looks}) == [2, 3] and len(looks) == LOOKS
     first = _start_tracks(scans, places, block.p.start_speed_m_s)

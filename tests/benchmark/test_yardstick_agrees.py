@@ -23,7 +23,7 @@ def test_yardstick_finds_the_same(case):
     simulation = Simulation(scene, recorder=Recorder([sink]))
     simulation.run()
     tables = sink.tables()
-    plain = yardstick.run(yardstick.prepare(simulation))
+    plain = yardstick.run(yardstick.prepare_plain_loop(simulation))
     rows = tables["detections"].to_pydict()
     place = {name: i for i, name in enumerate(simulation.components["traffic"].roster.names)}
     found = {

@@ -110,11 +110,11 @@ def test_a_channel_hands_each_row_over_once_and_not_before_it_arrives():
     channel = Channel("radar")
     channel.push(beats([0, 10, 20, 30]))
     channel.push(beats([40], start=4))
-    came, message = channel.collect(20)
+    came, message = channel.pop_arrived_rows(20)
     assert came.tick.tolist() == [0, 10] and message.value.tolist() == [0, 1]
-    assert channel.collect(20) is None
+    assert channel.pop_arrived_rows(20) is None
     assert channel.arrivals_before(41).tick.tolist() == [20, 30, 40]
-    came, message = channel.collect(41)
+    came, message = channel.pop_arrived_rows(41)
     assert came.tick.tolist() == [20, 30, 40] and message.value.tolist() == [2, 3, 4]
     assert channel.arrivals_before(10**6).tick.tolist() == []
 
@@ -128,27 +128,30 @@ def test_what_is_superseded_before_anybody_can_ask_is_forgotten():
         channel.drop_superseded_rows(25)
     assert len(channel.state()[0]) == 2  # that of 0 and 10 is gone
     asked = at([25, 35, 40])
-    (got, rows), (expected, places) = channel.sample(asked, 50), whole.sample(asked, 50)
+    (got, rows), (expected, places) = (
+        channel.held_rows_at_instants(asked, 50),
+        whole.held_rows_at_instants(asked, 50),
+    )
     assert got.tick[rows].tolist() == expected.tick[places].tolist() == [21, 30, 40]
 
 
 def test_a_delay_moves_the_arrival_and_not_what_the_row_speaks_of():
     channel = Channel("radar", delay_ticks=7)
     assert channel.push(beats([0, 10])).tick.tolist() == [7, 17]
-    assert channel.collect(7) is None
-    came, message = channel.collect(8)
+    assert channel.pop_arrived_rows(7) is None
+    came, message = channel.pop_arrived_rows(8)
     assert came.tick.tolist() == [7] and message.tick.tolist() == [0]
 
 
 def test_sampling_holds_the_last_arrived_row():
     channel = Channel("radar", delay_ticks=5)
     asked = at([0, 4, 5, 6, 14, 15, 100])
-    assert channel.sample(asked, 101) is None
+    assert channel.held_rows_at_instants(asked, 101) is None
     channel.push(beats([0, 10]))
-    message, rows = channel.sample(asked, 101)
+    message, rows = channel.held_rows_at_instants(asked, 101)
     held = [None if row < 0 else message.value[row] for row in rows]
     assert held == [None, None, 0, 0, 0, 1, 1]
-    message, rows = channel.sample(at([200, 201]), 202)
+    message, rows = channel.held_rows_at_instants(at([200, 201]), 202)
     assert message.value[rows].tolist() == [1, 1]
 
 
@@ -156,7 +159,7 @@ def test_what_a_channel_holds_before_the_first_row():
     channel = Channel("radar")
     channel.set_held_message(beats([0], start=9), 0)
     channel.push(beats([10]))
-    message, rows = channel.sample(at([0, 9, 10]), 11)
+    message, rows = channel.held_rows_at_instants(at([0, 9, 10]), 11)
     assert message.value[rows].tolist() == [9, 9, 0]
 
 
@@ -178,7 +181,7 @@ def test_sampling_in_windows_equals_looking_back_over_a_list(sent, batches, dela
     for a, b in itertools.pairwise(bounds):
         ticks = np.array([t for t in asked if a <= t < b], dtype=np.int64)
         if len(ticks):
-            sample = channel.sample(at(ticks), b)
+            sample = channel.held_rows_at_instants(at(ticks), b)
             rows = np.full(len(ticks), -1) if sample is None else sample[1]
             found += [None if r < 0 else sample[0].value[r] for r in rows]
     expected = []

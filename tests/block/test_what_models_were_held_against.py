@@ -5,7 +5,7 @@ from pathlib import Path
 from dsa_des.block.entry_points import COMPONENTS, entry_points_of
 from dsa_des.block.registry import find_component
 from dsa_des.evidence.case import read_case
-from dsa_des.evidence.inputs import models_of, verifications_of_class
+from dsa_des.evidence.inputs import models_of_blocks, verifications_of_class
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,7 +23,7 @@ def test_every_claim_names_a_test_that_is_there():
 
 def test_the_shipped_case_states_something_of_every_block():
     case = read_case(ROOT / "configs" / "evidence" / "noncooperative.toml")
-    assert all(model["verified"] for model in models_of(case.system_study))
+    assert all(model["verified"] for model in models_of_blocks(case.system_study))
 
 
 def test_a_sensor_is_held_to_what_all_sensors_are():

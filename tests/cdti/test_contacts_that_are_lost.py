@@ -19,7 +19,7 @@ def watched(scene):
     pictures = {}
 
     def look(scope, time_s):
-        pictures[time_s] = scope.picture(time_s)["contacts"]
+        pictures[time_s] = scope.page_content(time_s)["contacts"]
 
     _, found = displayed(scene, look, window=1)
     return pictures, found

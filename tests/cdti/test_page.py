@@ -30,9 +30,11 @@ def test_the_first_page_decides_and_the_second_watches():
 
 def test_a_token_is_of_one_run_and_not_to_be_guessed():
     door, other = Admission(), Admission()
-    assert door.is_token(door.token) and not door.is_token(other.token)
+    assert door.is_issued_token(door.token) and not door.is_issued_token(other.token)
     assert (
-        not door.is_token("") and not door.is_token(door.token[:-1]) and not door.is_token("\udcff")
+        not door.is_issued_token("")
+        and not door.is_issued_token(door.token[:-1])
+        and not door.is_issued_token("\udcff")
     )
     assert len(door.token) >= 32
 
@@ -40,14 +42,14 @@ def test_a_token_is_of_one_run_and_not_to_be_guessed():
 def test_a_new_address_decides_where_the_old_one_no_longer_does():
     door = Admission()
     old = door.token
-    assert door.renew_token() == old  # nobody has come yet
+    assert door.unused_operator_token() == old  # nobody has come yet
     _, key = door.role_and_key(old, "")
-    new = door.renew_token()
-    assert new != old and door.renew_token() == new
+    new = door.unused_operator_token()
+    assert new != old and door.unused_operator_token() == new
     assert door.role_and_key(old, "") == (WATCHER, "")
     assert door.role_and_key(new, "")[0] == OPERATOR
     assert door.role_and_key(old, key) == (WATCHER, "")  # who comes back late has lost its place
-    assert door.is_token(old) and door.is_token(new)
+    assert door.is_issued_token(old) and door.is_issued_token(new)
 
 
 ID = "0123456789abcdef"

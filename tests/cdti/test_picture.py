@@ -17,14 +17,14 @@ from components.cdti.contacts import (
     Contacts,
     OwnFlight,
     OwnNow,
-    contacts_of_lines,
+    contacts_after_lines,
     contacts_of_states,
 )
 from components.cdti.loss_area import predicted_loss_area
 from components.cdti.scope import Scope
 from components.messages.state_tracks import StateTracks
 from components.messages.tracks import Tracks
-from components.optical.silhouette import union_area
+from components.optical.silhouette import exact_area_of_bodies_union
 from components.well_clear.volume import Volume, violates
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -57,7 +57,7 @@ def east_north_up(time_s):
 
 def test_a_ranged_contact_lies_where_the_target_is(tmp_path):
     scope = watched(tmp_path)
-    shown = scope.picture(6.0)
+    shown = scope.page_content(6.0)
     assert shown["own"]["heading"] == pytest.approx(217, abs=0.01)
     assert shown["own"]["speed"] == pytest.approx(70, abs=0.5)
     ((number, east, north, up, bearing, age, *flight, level),) = shown["contacts"]
@@ -73,11 +73,11 @@ def test_a_ranged_contact_lies_where_the_target_is(tmp_path):
 
 def test_a_contact_without_a_range_is_a_direction(tmp_path):
     scope = watched(tmp_path, ("range_km = 15", "range_km = 0.5"))
-    ((_, east, north, up, bearing, age, *_),) = scope.picture(6.0)["contacts"]
+    ((_, east, north, up, bearing, age, *_),) = scope.page_content(6.0)["contacts"]
     assert east is north is up is None
     wanted = east_north_up(6.0 - age)
     assert bearing == pytest.approx(math.degrees(math.atan2(*wanted[:2])) % 360, abs=1)
-    assert scope.picture(6.0 + 11.0)["contacts"] == []  # forgotten
+    assert scope.page_content(6.0 + 11.0)["contacts"] == []  # forgotten
 
 
 def test_a_range_is_held_for_a_while_along_the_new_direction():
@@ -94,7 +94,7 @@ def test_a_range_is_held_for_a_while_along_the_new_direction():
             np.zeros(2, dtype=int), None, ("eo",), azimuth_rad=np.array([math.pi / 2, 0.0]),
             elevation_rad=np.zeros(2), range_m=np.full(2, np.nan),
         )  # fmt: skip
-        return contacts_of_lines(tracks, own, 1, before)
+        return contacts_after_lines(tracks, own, 1, before)
 
     held = after(3)
     assert held.ranged.tolist() == [True, False]
@@ -197,7 +197,7 @@ def test_the_silhouette_covers_as_much_as_the_detection_counts(target_deg, towar
     one = [np.array([value]) for value in (12.0, 30.0, 90.0)]
     bearing = toward[0] + own[0]
     angles = [np.array([a]) for a in (target[0] - bearing, target[1], target[2], toward[1])]
-    wanted = union_area(*angles, *one, None)[0] / (range_m**2 * pixel[0] * pixel[1])
+    wanted = exact_area_of_bodies_union(*angles, *one, None)[0] / (range_m**2 * pixel[0] * pixel[1])
     assert covered == pytest.approx(wanted, rel=0.03)  # circles of 16 corners lack 2.6 %
 
 

@@ -49,7 +49,7 @@ def seen(request):
     )  # fmt: skip
     scope, recorded = displayed(scene)
     contact = {}
-    for number, _, _, _, bearing, *_ in scope.picture(DURATION_S)["contacts"]:
+    for number, _, _, _, bearing, *_ in scope.page_content(DURATION_S)["contacts"]:
         off = {n: abs(bearing_deg(t) - bearing) for n, t in TARGETS.items()}
         contact.setdefault(min(off, key=off.get), number)
     assert set(contact) == set(TARGETS)
@@ -72,7 +72,7 @@ def attitude(name):
 def test_the_newest_picture_of_the_chosen_contact_is_shown(seen):
     scope, contact, found = seen
     for name, sensor in (("turning", "eye"), ("rolling", "again"), ("below", "eye")):
-        shown = scope.camera_picture(scope.picture(DURATION_S), DURATION_S, contact[name])
+        shown = scope.camera_picture(scope.page_content(DURATION_S), DURATION_S, contact[name])
         detected = found[sensor, name]
         assert (shown["target"], shown["sensor"]) == (contact[name], sensor)
         assert shown["age"] == pytest.approx(DURATION_S - detected["time_s"], abs=0.006)
@@ -93,20 +93,20 @@ def test_only_a_camera_s_detections_with_their_pixels_are_pictures():
     sights = CameraSights({"eye": object.__new__(ElectroOptical), "other": object()})
     sights.states = SimpleNamespace(columns=np.array([0]))
     sights.store_detections("other", message, 10)
-    assert sights.picture(0, None, 1.0, None) is None
+    assert sights.picture_of_contact(0, None, 1.0, None) is None
     sights.store_detections("eye", SimpleNamespace(**{**vars(message), "extras": {}}), 10)
-    assert sights.picture(0, None, 1.0, None) is None
+    assert sights.picture_of_contact(0, None, 1.0, None) is None
     sights.store_detections(
         "eye", SimpleNamespace(**{**vars(message), "target": np.array([-1])}), 10
     )
-    assert sights.picture(0, None, 1.0, None) is None
+    assert sights.picture_of_contact(0, None, 1.0, None) is None
 
 
 @pytest.mark.parametrize(("name", "sensor"), [("turning", "eye"), ("rolling", "again")])
 def test_wings_lie_on_the_picture_as_they_are_seen(seen, name, sensor):
     """Corners of the plate, turned from the target's axes into the camera's, as angles."""
     scope, contact, found = seen
-    shown = scope.camera_picture(scope.picture(DURATION_S), DURATION_S, contact[name])
+    shown = scope.camera_picture(scope.page_content(DURATION_S), DURATION_S, contact[name])
     detected = found[sensor, name]
     middle = detected["azimuth_rad"], detected["elevation_rad"]
     centre = detected["true_range_m"] * crooked.direction(*middle)
@@ -127,7 +127,7 @@ def test_wings_lie_on_the_picture_as_they_are_seen(seen, name, sensor):
 def test_the_horizon_is_where_it_is_and_stands_askew(seen):
     """Along the line on the picture, lines of sight touch the Earth."""
     scope, contact, found = seen
-    picture = scope.picture(DURATION_S)
+    picture = scope.page_content(DURATION_S)
     shown = scope.camera_picture(picture, DURATION_S, contact["turning"])
     detected = found["eye", "turning"]
     tilt = math.radians(shown["tilt"])
@@ -150,7 +150,7 @@ def test_an_old_picture_is_of_a_target_and_of_no_track(seen):
     """Who was seen where a track now is may have been anybody."""
     scope, contact, _ = seen
     for name, number in contact.items():
-        later = scope.camera_picture(scope.picture(DURATION_S + 3.0), DURATION_S + 3.0, number)
+        later = scope.camera_picture(scope.page_content(DURATION_S + 3.0), DURATION_S + 3.0, number)
         assert (later is None) is (number >= 1_000_000), name
 
 

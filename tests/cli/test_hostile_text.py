@@ -229,7 +229,7 @@ def test_progress_bars_show_titles_as_they_are() -> None:
     from dsa_des.terminal import terminal
     from dsa_des.terminal.safe_console import SafeConsole
 
-    bar: Progress = terminal.progress("text")
+    bar: Progress = terminal.progress_bar("text")
     stream = io.StringIO()
     bar.live.console = SafeConsole(file=stream, force_terminal=False, width=400)
     bar.add_task(HOSTILE, total=1, text=HOSTILE)

@@ -127,11 +127,11 @@ def test_a_study_that_is_stopped_says_how_to_go_on(
 @pytest.mark.parametrize(
     ("where", "words"),
     [
-        ("dsa_des.commands.scene.load_printing_notes", ["run", "{scene}"]),
+        ("dsa_des.commands.scene.load_scene_printing_notes", ["run", "{scene}"]),
         ("dsa_des.running.recorded_run.to_toml", ["run", "{scene}", "--duration", "1"]),
-        ("dsa_des.commands.scene.load_printing_notes", ["check", "{scene}"]),
+        ("dsa_des.commands.scene.load_scene_printing_notes", ["check", "{scene}"]),
         ("dsa_des.commands.graph._block_positions", ["graph", "{scene}", "--png"]),
-        ("dsa_des.commands.scene.load_printing_notes", ["explain", "{scene}"]),
+        ("dsa_des.commands.scene.load_scene_printing_notes", ["explain", "{scene}"]),
         ("dsa_des.commands.cost.measure_rungs", ["cost", "{scene}", "--block", "transform"]),
         ("dsa_des.commands.catalogue.show_components", ["components"]),
         ("dsa_des.commands.study.read_study", ["study", "study.toml"]),

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner, Result
 
-from dsa_des.block.shadowed_packages import NotImportable, load_named, refuse_hidden_module
+from dsa_des.block.shadowed_packages import NotImportable, import_named_object, refuse_hidden_module
 from dsa_des.cli import main
 from dsa_des.errors import UsageError
 from tests import warm_process
@@ -86,14 +86,14 @@ def test_a_second_module_of_the_same_name_is_not_taken_for_the_first(
         (tmp_path / name).mkdir()
         (tmp_path / name / "own_twin.py").write_text(f"class Mine:\n    of = {name!r}\n")
     monkeypatch.chdir(tmp_path)
-    assert load_named("own_twin:Mine", beside=(tmp_path / "a",)).of == "a"
-    assert load_named("own_twin:Mine", beside=(tmp_path / "a",)).of == "a"
+    assert import_named_object("own_twin:Mine", beside=(tmp_path / "a",)).of == "a"
+    assert import_named_object("own_twin:Mine", beside=(tmp_path / "a",)).of == "a"
     with pytest.raises(NotImportable) as caught:
-        load_named("own_twin:Mine", beside=(tmp_path / "b",))
+        import_named_object("own_twin:Mine", beside=(tmp_path / "b",))
     assert str(tmp_path / "a/own_twin.py") in str(caught.value)
     assert str(tmp_path / "b/own_twin.py") in str(caught.value)
-    assert load_named("./a/own_twin.py:Mine").of == "a"
-    assert load_named("./b/own_twin.py:Mine").of == "b"
+    assert import_named_object("./a/own_twin.py:Mine").of == "a"
+    assert import_named_object("./b/own_twin.py:Mine").of == "b"
 
 
 def test_a_file_is_relative_to_what_names_it(call: Call, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from rich.text import Text
 
 from dsa_des.errors import Problem, SceneError, UsageError
 from dsa_des.terminal.safe_console import SafeConsole
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 HOSTILE = "\x1b[31m\x07\x08\r\n\t\x7f\x85\x9b\u200b\u2028\u202e\u2066\ud800\U000e0001"
 ANY_TEXT = st.text(st.characters())
@@ -28,26 +28,26 @@ def bad_letters(text: str, allowed: str = "") -> set[str]:
 
 @given(ANY_TEXT)
 def test_nothing_printed_has_a_control_format_or_surrogate_letter(text: str) -> None:
-    shown = printable(text)
+    shown = escape_unprintable(text)
     assert not bad_letters(shown)
-    assert printable(shown) == shown
+    assert escape_unprintable(shown) == shown
 
 
 @given(ANY_TEXT)
 def test_what_is_plain_is_left_alone(text: str) -> None:
     plain = "".join(letter for letter in text if letter.isprintable())
-    assert printable(plain) == plain
+    assert escape_unprintable(plain) == plain
 
 
 @given(ANY_TEXT, st.integers(2, 40))
 def test_shortened_text_is_short_and_says_so(text: str, most: int) -> None:
     shown = shorten(text, most)
     assert len(shown) <= most
-    assert shown == printable(text) or shown.endswith("…")
+    assert shown == escape_unprintable(text) or shown.endswith("…")
 
 
 def test_escapes_name_their_letters() -> None:
-    assert printable("\x1b\u202e\U000e0001\n") == r"\x1b\u202e\U000e0001\n"
+    assert escape_unprintable("\x1b\u202e\U000e0001\n") == r"\x1b\u202e\U000e0001\n"
 
 
 @given(ANY_TEXT, ANY_TEXT, ANY_TEXT)
@@ -71,7 +71,7 @@ def test_a_console_prints_text_and_nothing_else(text: str) -> None:
     console.print(table)
     shown = stream.getvalue()
     assert not bad_letters(shown, "\n")
-    assert shown.count(printable(text)) >= 3
+    assert shown.count(escape_unprintable(text)) >= 3
     assert "\n\n" not in console.render_str(HOSTILE).plain
 
 

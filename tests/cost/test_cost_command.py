@@ -19,7 +19,7 @@ from components.radar.detection.ladder import DETECTION
 from dsa_des.block.ladder import Unavailable
 from dsa_des.cli import main
 from dsa_des.commands import cost
-from dsa_des.commands.cost import ladders_to_climb
+from dsa_des.commands.cost import ladders_to_run_and_notes
 from dsa_des.costs import replay
 from dsa_des.costs.climb import measure_rungs
 from dsa_des.costs.replay import RungRun, run_rung
@@ -213,7 +213,7 @@ def test_a_projection_stands_on_the_ladder_of_its_band(band, type_name):
     variants = Variants(
         str(SCENE), swaps=["ir=optical.projection"], sets=[f"blocks.ir.band={band}"]
     )
-    ((_, ladder),) = ladders_to_climb(variants, "ir", None)[0]
+    ((_, ladder),) = ladders_to_run_and_notes(variants, "ir", None)[0]
     assert ladder.rung(ladder.reference).type_name == type_name
     best = variants.with_rungs([Choice("ir", ladder, ladder.rung(ladder.reference))])
     assert best.blocks["ir"].type_name == type_name

@@ -9,9 +9,13 @@ from matplotlib.figure import Figure
 
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.costs.climb import Comparison, RungCost
-from dsa_des.costs.cost_report import _cost_cells, draw_costs, put_labels
+from dsa_des.costs.cost_report import (
+    _cost_cells,
+    draw_error_against_cost,
+    place_labels_without_overlap,
+)
 from dsa_des.costs.replay import Spread
-from dsa_des.record.drawing import keep_figures
+from dsa_des.record.drawing import collect_drawn_figures
 
 
 def test_labels_cover_neither_each_other_nor_a_point():
@@ -24,7 +28,9 @@ def test_labels_cover_neither_each_other_nor_a_point():
         "exact (scene)": (0.36, 20.0), "sampled_table": (0.62, 0.36), "mesh": (700.0, 0.6),
         "union: 5e-15 m²": (0.62, 0.03), "window": (0.62, 0.37), "far right of all": (8e3, 1.0),
     }  # fmt: skip
-    put_labels(axes, [(name, at, 0.1 * at[0], "black") for name, at in points.items()])
+    place_labels_without_overlap(
+        axes, [(name, at, 0.1 * at[0], "black") for name, at in points.items()]
+    )
     boxes = {text.get_text(): text.get_window_extent(renderer) for text in axes.texts}
     assert boxes.keys() == points.keys()
     for one, other in combinations(boxes, 2):
@@ -49,8 +55,8 @@ def _costs(block: str) -> list[RungCost]:
 @pytest.mark.parametrize("panels", [1, 2])
 def test_the_title_is_whole_and_off_the_panels(panels, tmp_path):
     costs = [cost for panel in range(panels) for cost in _costs(f"block_{panel}")]
-    with keep_figures() as kept:
-        draw_costs(tmp_path / "cost.png", "A lookout who sees another aircraft", costs)
+    with collect_drawn_figures() as kept:
+        draw_error_against_cost(tmp_path / "cost.png", "A lookout who sees another aircraft", costs)
     figure = kept["cost"]
     renderer = FigureCanvasAgg(figure).get_renderer()
     box = figure._suptitle.get_window_extent(renderer)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from components.aircraft.known_targets import offered_rosters
-from components.optical.area_of_cells import body_mesh, silhouette_table_of_bodies
+from components.optical.area_of_cells import capsule_and_plate_mesh, silhouette_table_of_bodies
 from components.optical.sensors import fuselage_length_m
-from components.optical.silhouette import union_area, visible_area
+from components.optical.silhouette import exact_area_of_bodies_union, visible_area
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.running.simulation import Simulation
@@ -66,7 +66,9 @@ def random_views(count=400):
 
 def union(view, back=None):
     areas = [np.full(len(view[0]), a) for a in AREAS]
-    return union_area(*view, *areas, None if back is None else np.full(len(view[0]), back))
+    return exact_area_of_bodies_union(
+        *view, *areas, None if back is None else np.full(len(view[0]), back)
+    )
 
 
 @pytest.mark.parametrize("back", [None, 24.0])
@@ -83,7 +85,7 @@ def test_a_sampled_table_is_the_union_at_its_nodes_and_near_it_between(back):
 
 def test_a_mesh_of_the_bodies_is_the_closed_form_within_its_facets():
     view = random_views(60)
-    by_mesh = visible_area(*view, model="convex_hull", mesh=body_mesh(*AREAS))
+    by_mesh = visible_area(*view, model="convex_hull", mesh=capsule_and_plate_mesh(*AREAS))
     assert np.abs(by_mesh / union(view) - 1.0).max() < 0.03
     with pytest.raises(ValueError, match="has no mesh"):
-        body_mesh(0.0, 30.0, 90.0)
+        capsule_and_plate_mesh(0.0, 30.0, 90.0)

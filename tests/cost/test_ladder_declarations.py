@@ -7,7 +7,7 @@ from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.ladder import Ladder, Quantity, Rung
 from dsa_des.block.registry import find_component
 from dsa_des.cli import main
-from dsa_des.costs.climb import is_on_front, parse_budgets
+from dsa_des.costs.climb import allowed_errors_by_unit, flag_points_on_front
 from dsa_des.errors import UsageError
 
 LADDERS = [
@@ -56,13 +56,13 @@ def test_a_ladder_says_what_is_wrong_with_it():
 
 def test_the_front_holds_what_nothing_beats():
     points = [(1, 5), (2, 5), (2, 3), (3, 3), (4, 0), (5, float("nan")), (1, 5)]
-    assert is_on_front(points) == [True, False, True, False, True, False, True]
+    assert flag_points_on_front(points) == [True, False, True, False, True, False, True]
 
 
 def test_budgets_are_numbers_with_a_unit_of_the_ladders():
     ladders = [ladder for name in entry_points_of() for ladder in find_component(name).ladders]
-    assert parse_budgets(["0.5mrad", "2 m", "1e-3pd", "1m2"], ladders) == {
+    assert allowed_errors_by_unit(["0.5mrad", "2 m", "1e-3pd", "1m2"], ladders) == {
         "mrad": 0.5, "m": 2.0, "Pd": 1e-3, "m²": 1.0}  # fmt: skip
     for wrong in ("mrad", "0mrad", "-1m", "1.2.3m", "1furlong", "nan m"):
         with pytest.raises(UsageError, match="--budget"):
-            parse_budgets([wrong], ladders)
+            allowed_errors_by_unit([wrong], ladders)

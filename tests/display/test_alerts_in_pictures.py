@@ -6,7 +6,12 @@ import pyarrow.parquet as pq
 import pytest
 from matplotlib.figure import Figure
 
-from components.display.alerted import Alerted, alert_style, draw_alerted_lines, draw_manoeuvres
+from components.display.alerted import (
+    Alerted,
+    alert_colour_and_width,
+    draw_alerted_lines,
+    draw_manoeuvres,
+)
 
 ROWS = [  # time, block, target, level
     (0.0, "one", "a", 0), (0.0, "one", "b", 1), (1.0, "one", "a", 2), (1.0, "two", "a", 1),
@@ -55,10 +60,10 @@ def test_lines_are_thicker_where_there_is_an_alert(alerted):
     assert ends == [
         ([10.0, 4.0], [30.0, 2.0]), ([30.0, 2.0], [40.0, 1.0]), ([50.0, 0.0], [60.0, -1.0]),
     ]  # fmt: skip
-    assert list(drawn.get_linewidths()) == [alert_style(level)[1] for level in (2, 3, 1)]
-    assert alert_style(1)[1] < alert_style(2)[1] < alert_style(3)[1] and alert_style(
-        4
-    ) == alert_style(3)
+    assert list(drawn.get_linewidths()) == [alert_colour_and_width(level)[1] for level in (2, 3, 1)]
+    assert alert_colour_and_width(1)[1] < alert_colour_and_width(2)[1] < alert_colour_and_width(3)[
+        1
+    ] and alert_colour_and_width(4) == alert_colour_and_width(3)
     draw_manoeuvres(axes, np.array([1.0, 2.0]), np.array([3.0, 4.0]))
     (marks,) = axes.lines
     assert marks.get_xydata().tolist() == [[1.0, 3.0], [2.0, 4.0]]

@@ -531,5 +531,7 @@ def test_legends_beside_the_map_end_within_the_picture():
     none = {"radar_b": np.empty(0)}
     detected = Detected(["radar_b"], none, none, {}, [], {"radar_b": RADAR})
     counts = {"sensors": {"radar_b": {"detections": 1026}}}
-    handles = plan._legend({}, detected, {"radar_b": 1026}, counts, {"radar_b": "head_on"}, False)
+    handles = plan._legend_entries(
+        {}, detected, {"radar_b": 1026}, counts, {"radar_b": "head_on"}, False
+    )
     assert handles[-1].get_label() == "radar_b on head_on:\n1,026 detections"

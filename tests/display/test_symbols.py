@@ -12,12 +12,12 @@ from components.display.symbols import (
     OWN,
     TARGET,
     Labels,
-    draw_density,
+    draw_line_density,
     draw_lines,
     rows_by_target,
     sensor_marks,
     spread_indices,
-    stagger_marks,
+    staggered_mark_indices,
     targets_legend_entry,
 )
 from components.fusion.gated import Gated
@@ -27,7 +27,7 @@ from components.radar.swerling import SwerlingRadar
 from components.sensor import palette
 from components.tracking.stub import TrackerStub
 from dsa_des.block.component import Component
-from dsa_des.block.mark import NEUTRAL, marks_of
+from dsa_des.block.mark import NEUTRAL, plot_mark_by_name
 
 LETTER, LINE, GAP, CELL = module._LETTER_PX, module._LINE_PX, module._GAP_PX, module._CELL_PX
 UNIT = 0.01  # per pixel, on a map of 800 by 600 pixels
@@ -109,22 +109,22 @@ def test_where_all_is_covered_the_least_covered_place_is_taken():
 
 def test_marks_keep_their_distance_and_the_first_one():
     along = np.linspace(0.0, 100.0, 1001)
-    kept = stagger_marks(along, 10.0, 0.0)
+    kept = staggered_mark_indices(along, 10.0, 0.0)
     assert kept[0] == 0
     assert np.allclose(np.diff(along[kept]), 10.0)
 
 
 def test_two_sensors_take_turns():
     along = np.linspace(0.0, 100.0, 1001)
-    one, other = (along[stagger_marks(along, 10.0, phase)[1:]] for phase in (0.0, 0.5))
+    one, other = (along[staggered_mark_indices(along, 10.0, phase)[1:]] for phase in (0.0, 0.5))
     assert np.abs(one[:, None] - other).min() >= 4.9
 
 
 def test_gaps_stay_gaps_and_unknown_places_are_left_out():
     along = np.array([np.nan, 0.0, 1.0, 80.0, 81.0, np.nan])
-    assert stagger_marks(along, 10.0, 0.0).tolist() == [1, 3]
-    assert stagger_marks(np.full(3, np.nan), 10.0, 0.0).tolist() == []
-    assert stagger_marks(np.zeros(5), 10.0, 0.3).tolist() == [0]
+    assert staggered_mark_indices(along, 10.0, 0.0).tolist() == [1, 3]
+    assert staggered_mark_indices(np.full(3, np.nan), 10.0, 0.0).tolist() == []
+    assert staggered_mark_indices(np.zeros(5), 10.0, 0.3).tolist() == [0]
 
 
 def test_evenly_keeps_both_ends():
@@ -153,11 +153,11 @@ def test_every_block_of_a_kind_has_the_colour_of_its_kind() -> None:
                       (Gated, palette.FUSION), (TrackerStub, palette.TRACKER)):  # fmt: skip
         for names in (["a", "b", "z"], ["z"]):
             classes: dict[str, type | None] = dict.fromkeys(names, Component) | {"z": cls}
-            assert marks_of(classes)["z"] == kind, cls
+            assert plot_mark_by_name(classes)["z"] == kind, cls
 
 
 def test_two_of_a_kind_share_the_colour_and_not_the_marker() -> None:
-    found = marks_of({"front": SwerlingRadar, "aft": RangeBoundary})
+    found = plot_mark_by_name({"front": SwerlingRadar, "aft": RangeBoundary})
     assert found["front"].colour == found["aft"].colour == palette.RADAR.colour
     assert found["front"].marker != found["aft"].marker
 
@@ -188,7 +188,7 @@ def test_density_counts_each_line_once_in_every_cell_that_it_crosses():
     axes.set(xlim=(0.0, 160.0), ylim=(0.0, 100.0))
     level = np.array([[0.0, 10.5], [160.0, 10.5]])
     gap = np.array([[0.0, 20.5], [np.nan, np.nan], [160.0, 20.5]])
-    draw_density(axes, [level, level, gap, np.array([[5.5, 30.5]])])
+    draw_line_density(axes, [level, level, gap, np.array([[5.5, 30.5]])])
     cells = np.ma.filled(axes.collections[0].get_array().reshape(100, 160), 0.0)
     assert (cells[10] == 2.0).all()
     assert cells[20, 80] == 0.0 and cells[30, 5] == 1.0

@@ -12,7 +12,7 @@ from components.encounters.pair_densities import (
     StepDensity,
     relative_speed_over_directions,
 )
-from components.encounters.pairing import COURSES, Pairs, PairSampler, draw_courses
+from components.encounters.pairing import COURSES, Pairs, PairSampler, draw_intruder_courses_rad
 from components.encounters.track_rules import TrackError
 from components.metrics.risk import risk_ratio
 from tests.encounters.reference_data import reference_file
@@ -293,8 +293,10 @@ def test_courses_are_those_whose_relative_speed_is_drawn():
     first, second = np.full((2, 4), 100.0)
     climb = np.array([0.0, 0.0, 100.0 * 2**0.5, 0.0])
     # The third has 3,820 + 20,000 there, of at most 60,000: 25,350 are asked.
-    turns = draw_courses(first, second, climb, drawn) / (2.0 * np.pi)
+    turns = draw_intruder_courses_rad(first, second, climb, drawn) / (2.0 * np.pi)
     np.testing.assert_allclose(turns, [0.5, 0.1, 0.25, 0.25])
-    unlike = draw_courses(np.array([300.0]), np.array([100.0]), np.zeros(1), drawn[:, :1])
+    unlike = draw_intruder_courses_rad(
+        np.array([300.0]), np.array([100.0]), np.zeros(1), drawn[:, :1]
+    )
     # (300² + 100² - 60,000 cos 36 deg) of 160,000: 51,459, of which 32,400 are asked.
     assert unlike[0] / (2.0 * np.pi) == pytest.approx(0.1)

@@ -52,7 +52,7 @@ def made(tmp_path_factory) -> EncounterSet:
 def test_pairs_are_closest_when_and_where_they_should_be(made):
     horizontal, vertical = [], []
     for index in range(len(made)):
-        ((times, own, other),) = made.common_samples(index)
+        ((times, own, other),) = made.common_times_and_positions(index)
         assert times.tolist() == list(range(181))
         apart = other - own
         at = int(np.argmin(np.hypot(*apart[:2])))
@@ -79,7 +79,7 @@ def test_weights_undo_what_was_drawn_more_often(made):
         for (edge, height), before in zip(steps, (0, 500, 1500), strict=True)
     )
     for index in range(len(made)):
-        ((_, own, other),) = made.common_samples(index)
+        ((_, own, other),) = made.common_times_and_positions(index)
         velocities = [(path[:, 151] - path[:, 149]) / 2 / FOOT_M for path in (own, other)]
         first, second = (np.hypot(v[0], v[1]) for v in velocities)
         climb = velocities[1][2] - velocities[0][2]
@@ -104,7 +104,9 @@ def test_an_encounter_is_the_same_whichever_others_are_made(tmp_path, made):
     assert result.exit_code == 0
     one = read_set(out)
     assert one.numbers.tolist() == [17] and one.weights[0] == made.weights[17]
-    for mine, other in zip(one.common_samples(0), made.common_samples(17), strict=True):
+    for mine, other in zip(
+        one.common_times_and_positions(0), made.common_times_and_positions(17), strict=True
+    ):
         assert all((a == b).all() for a, b in zip(mine, other, strict=True))
 
 

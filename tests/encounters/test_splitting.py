@@ -8,8 +8,8 @@ import pytest
 
 import dsa_des
 from components.encounters.splitting import (
-    draw_copies,
-    expected_copies,
+    draw_copy_counts,
+    expected_copy_counts,
     least_miss_in_nmac_sizes,
     split_set,
 )
@@ -22,25 +22,25 @@ LEVELS, COPIES = np.array([8.0, 2.0]), np.array([0.3, 1.0, 3.5])
 
 
 def test_copies_by_hand() -> None:
-    found = expected_copies(np.array([9.0, 8.0, 7.9, 2.0, 0.0]), LEVELS, COPIES)
+    found = expected_copy_counts(np.array([9.0, 8.0, 7.9, 2.0, 0.0]), LEVELS, COPIES)
     assert found.tolist() == [0.3, 0.3, 1.0, 1.0, 3.5]
     for levels, copies, said in (
         ([2.0, 8.0], COPIES, "falling"), ([8.0], COPIES, "1 levels need 2"),
         (LEVELS, [0.0, 1, 2], "above 0"), ([], [1.0], "falling"),
     ):  # fmt: skip
         with pytest.raises(ValueError, match=said):
-            expected_copies(np.zeros(2), np.array(levels), np.array(copies))
+            expected_copy_counts(np.zeros(2), np.array(levels), np.array(copies))
 
 
 def test_the_expected_number_is_that_and_an_encounter_s_own() -> None:
     numbers, expected = np.arange(40_000), np.tile([0.3, 1.0, 2.75, 3.0], 10_000)
-    many = draw_copies(numbers, expected, 5)
+    many = draw_copy_counts(numbers, expected, 5)
     for k, r in enumerate((0.3, 1.0, 2.75, 3.0)):
         error = np.sqrt(max((r % 1) * (1 - r % 1), 0.0) / 10_000)
         assert abs(many[k::4].mean() - r) <= 4 * error
     # A function of number and seed: others in the batch change nothing.
-    assert (draw_copies(numbers[7:9], expected[7:9], 5) == many[7:9]).all()
-    assert (draw_copies(numbers, expected, 6) != many).any()
+    assert (draw_copy_counts(numbers[7:9], expected[7:9], 5) == many[7:9]).all()
+    assert (draw_copy_counts(numbers, expected, 6) != many).any()
 
 
 def airspace(random, count):
@@ -61,8 +61,8 @@ def test_split_sets_agree_with_plain_ones_and_know_how_wrong_they_are() -> None:
     ratios, held, widths, plain_widths, rounds = [], 0, [], [], 200
     for seed in range(rounds):
         score, w, n, fails = airspace(random, 1500)
-        expected = expected_copies(score, np.array([4.0]), np.array([0.15, 2.5]))
-        many = draw_copies(np.arange(1500), expected, seed)
+        expected = expected_copy_counts(score, np.array([4.0]), np.array([0.15, 2.5]))
+        many = draw_copy_counts(np.arange(1500), expected, seed)
         place = np.repeat(np.arange(1500), many)
         m = random.random(len(place)) < fails[place]  # each copy has random numbers of its own
         found = risk_ratio(n[place], m, (w / expected)[place], cluster=place)

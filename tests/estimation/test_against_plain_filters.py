@@ -6,7 +6,7 @@ import numpy as np
 import plain_filters as plain
 import pytest
 
-from components.association.jpda import exact_marginals, marginals
+from components.association.jpda import exact_pair_probabilities, pair_probabilities
 from components.estimation.estimator import (
     Estimates,
     log_mixture,
@@ -167,9 +167,9 @@ def test_shares_of_detections_by_all_joint_events():
     for _ in range(40):
         weights = np.exp(rng.normal(0, 3, (3, 3))) * (rng.uniform(size=(3, 3)) < 0.7)
         expected = plain.shares(weights)
-        assert np.allclose(exact_marginals(weights), expected, rtol=1e-9, atol=1e-12)
+        assert np.allclose(exact_pair_probabilities(weights), expected, rtol=1e-9, atol=1e-12)
         track, detection = np.nonzero(weights)
-        found = marginals(track, detection, weights[track, detection])
+        found = pair_probabilities(track, detection, weights[track, detection])
         assert np.allclose(found, expected[track, detection], rtol=1e-9, atol=1e-12)
 
 

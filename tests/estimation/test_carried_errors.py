@@ -122,7 +122,7 @@ def test_a_late_position_lies_back_along_the_flight_and_reports_do_not_tell_how_
     root = np.random.default_rng(5).normal(size=(8, 8))
     covariance = (root @ root.T * 9.0 + np.diag([900.0] * 3 + [9.0] * 3 + [1.0] * 2))[..., None]
     moments = linear_moments(*late.linearise(kind, state, place), covariance)
-    moments = replace(moments, considered=late.considered_components)
+    moments = replace(moments, considered=late.uncorrected_components)
     variance = np.array([1e-6, 1e-6, 25.0, 1.0, 1.0, 1.0])[:, None]
     measured = np.array([0.01, -0.004, 30.0, 2.0, -1.0, 0.5])[:, None]
     moved, spread = update(state, covariance, moments.innovation(variance), measured)

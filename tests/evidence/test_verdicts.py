@@ -7,7 +7,12 @@ from types import SimpleNamespace
 import pytest
 
 from dsa_des.evidence.case import CaseRequirement
-from dsa_des.evidence.findings import Convergence, Finding, counts_of_running_estimate, verdict_line
+from dsa_des.evidence.findings import (
+    Convergence,
+    Finding,
+    unit_counts_and_settling_start,
+    verdict_line,
+)
 from dsa_des.results.statistics import Estimate
 
 
@@ -50,7 +55,7 @@ def test_what_does_not_pass_is_said_first():
     ("units", "last", "start"), [(24, 0.25, 18), (10_000, 0.5, 5000), (2, 0.5, 1)]
 )
 def test_counts_reach_over_the_whole_last_stretch(units, last, start):
-    counts, begins = counts_of_running_estimate(units, last)
+    counts, begins = unit_counts_and_settling_start(units, last)
     assert begins == start in counts and counts[-1] == units
     assert counts == sorted(set(counts)) and counts[0] >= 1
     stretch = [n for n in counts if n >= start]

@@ -21,7 +21,7 @@ from scipy.spatial.transform import Rotation
 import dsa_des
 from components.display.recorded_run import RecordedTables, tables_of
 from components.export.alert_levels import alerts_of
-from components.export.asterix_export import _state_tracks
+from components.export.asterix_export import _estimated_track_records
 from components.export.command import export
 from components.export.flight_files import daa_text, xyz_text
 from components.formats.daa_file import read_daa
@@ -216,7 +216,7 @@ def test_axes_far_from_the_start_are_those_of_the_start(tmp_path):
     assert math.degrees(math.atan2(turned[0], turned[1])) == pytest.approx(0.0, abs=0.01)
     assert nose == pytest.approx(turned[[1, 0, 2]] * [1, 1, -1] / np.linalg.norm(turned), abs=1e-4)
     # Of an estimated track, as ASTERIX has it: north where it is, and errors along its axes.
-    found = list(_state_tracks(tables_of(tmp_path / "far"), {"tracker": 1}))
+    found = list(_estimated_track_records(tables_of(tmp_path / "far"), {"tracker": 1}))
     values = [one.values for one in found if not (one.values["tentative"] or one.values["last"])][
         -1
     ]

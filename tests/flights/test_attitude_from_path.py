@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.flights.attitude import attitude_from_path, fit_path
+from components.flights.attitude import attitude_from_path, fit_velocity_and_acceleration
 from components.flights.legs import Climb, Turn
 from components.flights.scripted_flights import ScriptedTrajectory
 
@@ -79,5 +79,7 @@ def test_never_moving_is_all_zero(count):
 def test_clumped_times_do_not_make_up_a_turn():
     """Two noisy samples a millisecond apart, then ten seconds: no curve can be told from that."""
     time = np.array([0.0, 0.001, 10.0, 20.0])
-    _, acceleration = fit_path(time, np.array([0.0, 1e-6, 5e-3, 1e-2]), 0 * time, 0 * time)
+    _, acceleration = fit_velocity_and_acceleration(
+        time, np.array([0.0, 1e-6, 5e-3, 1e-2]), 0 * time, 0 * time
+    )
     assert np.abs(acceleration).max() < 0.5

@@ -122,7 +122,7 @@ def test_numbers_of_regular_times_are_those_inside(step_s, duration_s, first_s, 
     times = np.round(np.arange(int(duration_s / step_s) + 1) * step_s, 9)
     inside = np.flatnonzero((times >= first_s) & (times <= first_s + length_s))
     one = np.zeros(1, dtype=np.int64)
-    first, last = RegularTimes(step_s, duration_s).numbers_between(
+    first, last = RegularTimes(step_s, duration_s).first_and_last_sample_numbers(
         one, np.array([first_s]), np.array([first_s + length_s])
     )
     if len(inside):

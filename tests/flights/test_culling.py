@@ -104,7 +104,7 @@ def test_intervals_are_those_of_entry_and_exit() -> None:
     assert covered[range_m <= reach].all()
     spare = covered & (range_m > reach + 2.0)
     assert 0 < spare.sum() * 0.05 < len(found.target) * 1.2
-    assert found.most_at_once() == covered.sum(axis=1).max()
+    assert found.max_near_targets_at_once() == covered.sum(axis=1).max()
 
 
 def test_absent_targets_and_an_absent_ownship_are_near_nobody() -> None:
@@ -119,7 +119,7 @@ def test_absent_targets_and_an_absent_ownship_are_near_nobody() -> None:
     assert found.target.tolist() == [0, 2]
     assert found.end_s == pytest.approx([20, 60], abs=0.6)
     none = near_intervals(ALONE, ScriptedFleet([]), 1000.0, 100.0)
-    assert len(none.targets_near(0, 100)) == 0 == none.most_at_once()
+    assert len(none.targets_near(0, 100)) == 0 == none.max_near_targets_at_once()
 
 
 def test_a_flight_along_the_edge_of_the_reach_is_not_cut_up_for_ever() -> None:

@@ -7,7 +7,7 @@ import pytest
 
 from components.flights.legs import Straight, Turn
 from components.flights.many_flights import SteeredFlight
-from components.flights.point_mass import eased_turn_rates
+from components.flights.point_mass import eased_turn_durations_and_rates
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.messages.steering import Manoeuvre
 
@@ -28,7 +28,7 @@ def told(heading_deg, **changes):
 @pytest.mark.parametrize("speed_mps", [35.0, 50.0, 180.0])
 def test_all_of_the_turn_is_turned_and_never_faster_than_told(turn_deg, speed_mps):
     left = math.radians(turn_deg)
-    rates = eased_turn_rates(left, left, 0.0, speed_mps, MOST, EASES)
+    rates = eased_turn_durations_and_rates(left, left, 0.0, speed_mps, MOST, EASES)
     assert sum(lasts_s * rate for lasts_s, rate in rates) == pytest.approx(turn_deg, abs=1e-9)
     assert max(abs(rate) for _, rate in rates) < 3.0 + 1e-6
     assert all(rate == 0.0 or abs(rate) >= 0.0999 for _, rate in rates)
@@ -38,7 +38,7 @@ def test_all_of_the_turn_is_turned_and_never_faster_than_told(turn_deg, speed_mp
 def test_the_bank_begins_at_30_degrees_a_second():
     """|p| <= 0.524 rad/s: after k tenths the bank is k times 0.0524 rad, and the rate follows."""
     left = math.radians(90.0)
-    rates = eased_turn_rates(left, left, 0.0, 50.0, MOST, EASES)
+    rates = eased_turn_durations_and_rates(left, left, 0.0, 50.0, MOST, EASES)
     assert rates[0] == (pytest.approx(0.05), 0.0)
     for k in (1, 2, 3):
         rate = math.degrees(G_M_S2 * math.tan(0.0524 * k) / 50.0)
@@ -47,7 +47,7 @@ def test_the_bank_begins_at_30_degrees_a_second():
 
 def test_near_the_heading_the_rate_is_in_proportion_to_what_was_left_a_second_ago():
     left = math.radians(60.0)
-    rates = eased_turn_rates(left, left, 0.0, 50.0, MOST, EASES)
+    rates = eased_turn_durations_and_rates(left, left, 0.0, 50.0, MOST, EASES)
     at_s = np.cumsum([lasts_s for lasts_s, _ in rates])
     left_deg = 60.0 - np.cumsum([lasts_s * rate for lasts_s, rate in rates])
     # Seconds of the law, which begin half a tenth after the turn does.

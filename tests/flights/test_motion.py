@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.flights.geodesic_motion import _distance_series, _longitude_series
-from components.flights.leg_motion import hold_state
+from components.flights.leg_motion import position_and_yaw_held
 from components.flights.point_mass import FT_S_PER_KT, cumulative_sums, fly_euler, fly_point_mass
 
 
@@ -162,6 +162,6 @@ def test_the_series_of_a_geodesic_are_those_of_its_integrals(eps, n):
 def test_who_stays_in_one_place_climbs_and_turns() -> None:
     """Latitude, longitude, altitude and climb, yaw and its rate; a yaw is from 0 to a turn."""
     table = np.array([[0.8, 0.8], [0.1, 0.2], [100.0, 100.0], [2.0, -3.0], [6.0, 1.0], [0.5, -0.5]])
-    lat, lon, alt, yaw = hold_state(table, np.array([10.0, 4.0]))
+    lat, lon, alt, yaw = position_and_yaw_held(table, np.array([10.0, 4.0]))
     assert (lat.tolist(), lon.tolist(), alt.tolist()) == ([0.8, 0.8], [0.1, 0.2], [120.0, 88.0])
     np.testing.assert_allclose(yaw, [11.0 - 2.0 * np.pi, 2.0 * np.pi - 1.0], rtol=1e-15)

@@ -12,7 +12,7 @@ from components.flights.legs import Turn
 from components.flights.sampled_flight import SampledTrajectory
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight
-from components.traffic.recorded import describe_suspicions
+from components.traffic.recorded import implausible_motion_sentences
 
 
 def distance(a, b):
@@ -199,5 +199,5 @@ def test_flights_that_no_aircraft_flies_are_said_with_their_speed(east_deg, up_m
         name="b", lat_deg=np.full(5, 52.01), lon_deg=4.0 + east_deg * seconds,
         alt_m=1200.0 + up_m * seconds, sample_times_s=seconds, velocity_was_ignored=False,
     )  # fmt: skip
-    found = describe_suspicions([craft])
+    found = implausible_motion_sentences([craft])
     assert len(found) == (said is not None) and (said is None or found[0].startswith(said))

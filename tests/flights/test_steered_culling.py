@@ -28,7 +28,7 @@ def flight(name, lat_deg, lon_deg, heading_deg, speed_mps):
 
 def near(culling, own, times):
     """Return which targets may be in reach of one ownship at times, (times, targets)."""
-    return culling.states_and_near(own, np.zeros(len(times), dtype=np.int64), times)[1]
+    return culling.own_states_and_near_mask(own, np.zeros(len(times), dtype=np.int64), times)[1]
 
 
 @pytest.mark.parametrize(("seed", "reach_m"), [(1, 8000.0), (2, 2000.0), (3, 40_000.0)])
@@ -62,7 +62,7 @@ def test_whoever_is_in_reach_is_near(seed, reach_m):
             assert alone.tolist() == whole[row : row + 1].tolist()
         turn = Manoeuvre(math.radians(draw.uniform(-170, 170)), math.radians(3.0))
         own = own.add_manoeuvres(np.array([0]), np.array([later]), [turn])
-        culling.forget(0, later)
+        culling.forget_ranges_from(0, later)
         assert own[0].max_speed_mps < 70.0 * 1.01
         now = later
     assert in_reach > 0
@@ -84,7 +84,7 @@ def test_what_was_known_of_a_later_time_is_forgotten_at_a_turn():
         SteeredCulling(before, ScriptedFleet(targets), 9000.0, 300.0) for _ in "ab"
     )
     straight = near(looked_ahead, before, times)
-    looked_ahead.forget(0, 40.0)
+    looked_ahead.forget_ranges_from(0, 40.0)
     whole = near(looked_ahead, turned, times)
     assert whole.tolist() == near(fresh, turned, times).tolist()
     assert (straight[times > 40.0] != whole[times > 40.0]).any()

@@ -9,7 +9,7 @@ from components.flights.many_flights import SteeredFleet, SteeredFlight, fleet_o
 from components.flights.scripted_flights import ScriptedTrajectory
 from components.geometry.ellipsoid import line_of_sight_ned
 from components.messages.steering import Manoeuvre
-from components.metrics.flown_flights import ManoeuvresTold, flown_as_steered
+from components.metrics.flown_flights import ManoeuvresTold, steered_flights
 
 STRAIGHT = ScriptedTrajectory(
     "own", lat_deg=52.0, lon_deg=4.0, alt_m=1000.0, heading_deg=90.0, speed_mps=60.0
@@ -172,7 +172,7 @@ def test_who_is_told_more_often_than_others_flies_as_if_alone():
     told = [[(10.0, left)], [(5.0, right), (30.0, left)], [(8.0, left), (9.0, right), (40.0, left)]]
     times = np.linspace(0.0, 80.0, 33)
     for one, found in zip(
-        told, flown_as_steered([STRAIGHT] * 3, list(map(as_told, told))), strict=True
+        told, steered_flights([STRAIGHT] * 3, list(map(as_told, told))), strict=True
     ):
         alone = SteeredFlight(STRAIGHT)
         for time_s, manoeuvre in one:
@@ -271,7 +271,7 @@ def test_a_turn_that_a_climb_meets_ends_where_it_would_have_ended():
     ends = np.array([30.0])
     assert alone.at(ends).yaw_rad == pytest.approx(only.at(ends).yaw_rad, abs=1e-4)
     times = np.linspace(0.0, 80.0, 33)
-    for found in flown_as_steered([STRAIGHT] * 2, [as_told(commands)] * 2):
+    for found in steered_flights([STRAIGHT] * 2, [as_told(commands)] * 2):
         for got, expected in zip(found.at(times).arrays(), alone.at(times).arrays(), strict=True):
             assert np.array_equal(got, expected)
 

@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 import dsa_des
 from components.foreign import mavlink
 from components.foreign.mavlink_messages import AutopilotSays, Flying, Link
-from components.foreign.stand_in_autopilot import StandIn, serve
+from components.foreign.stand_in_autopilot import StandIn, answer_and_list_senders
 from components.messages.state_tracks import StateTracks
 from dsa_des.errors import BlockFailure, SceneError
 
@@ -198,7 +198,7 @@ def test_over_the_loopback_it_is_the_same_flight(monkeypatch):
     for one in ends:
         one.close()
     senders = set()
-    autopilot = threading.Thread(target=lambda: senders.update(serve(port)))
+    autopilot = threading.Thread(target=lambda: senders.update(answer_and_list_senders(port)))
     autopilot.start()
     try:
         address = f"127.0.0.1:{port}"
@@ -227,8 +227,10 @@ def test_tracks_are_carried_on_to_the_instant(away_m):
         down_m=zero - 30, north_m_s=zero - 50, east_m_s=zero + 20, down_m_s=zero + 2,
         origin_lat_deg=zero - 33.9, origin_lon_deg=zero - 179.999, origin_alt_m=zero + 100,
     )  # fmt: skip
-    assert mavlink._tracks(message, np.array([0]), 30.5) == []  # of half a minute ago
-    (track,) = mavlink._tracks(message, np.array([0]), 9.5)
+    assert (
+        mavlink._extrapolated_ranged_tracks(message, np.array([0]), 30.5) == []
+    )  # of half a minute ago
+    (track,) = mavlink._extrapolated_ranged_tracks(message, np.array([0]), 9.5)
     assert track.age_s == 9.5
     origin = -33.9, -179.999, 100
     where = pymap3d.ned2geodetic(900 - 125, 50 - away_m, -30 + 5, *origin)

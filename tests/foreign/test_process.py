@@ -14,7 +14,7 @@ from covering import covers
 from wired import chain
 
 import dsa_des
-from components.foreign.process_link import ProcessError, ProcessLink, frame
+from components.foreign.process_link import ProcessError, ProcessLink, frame_parts_of_batch
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.errors import BlockFailure, SceneError
 from dsa_des.running.simulation import Simulation
@@ -29,7 +29,9 @@ EYE = {"type": "optical.range_boundary", "range_km": 20.0, "scan_rate_hz": 5}
 def folder(tmp_path):
     empty = pa.RecordBatch.from_arrays([], schema=pa.schema([]))
     for name, version in (("hello", "1"), ("hello_2", "2")):
-        (tmp_path / name).write_bytes(b"".join(frame("hello", empty, {"version": version})))
+        (tmp_path / name).write_bytes(
+            b"".join(frame_parts_of_batch("hello", empty, {"version": version}))
+        )
     return tmp_path
 
 
@@ -39,7 +41,7 @@ def canned(way, call, folder):
 
 def write_table(folder, name, columns):
     """Let the program answer a table."""
-    content = frame(name, pa.RecordBatch.from_pydict(columns), {})
+    content = frame_parts_of_batch(name, pa.RecordBatch.from_pydict(columns), {})
     (folder / "table").write_bytes(b"".join(content))
 
 
@@ -144,7 +146,7 @@ def test_detections_of_a_program_are_fused_as_any(folder):
         "target": ["diving"],
     }
     (folder / "table").write_bytes(
-        b"".join(frame("detections", pa.RecordBatch.from_pydict(columns), {}))
+        b"".join(frame_parts_of_batch("detections", pa.RecordBatch.from_pydict(columns), {}))
     )
     found = scene(canned("table", 3, folder))
     found["wires"].remove("eye -> fusion")
@@ -158,7 +160,7 @@ def test_detections_of_a_program_are_fused_as_any(folder):
 def test_it_is_called_on_a_clock_of_its_own(folder):
     columns = {"turn_rad": [1.0], "rate_rad_s": [0.1]}
     (folder / "table").write_bytes(
-        b"".join(frame("manoeuvres", pa.RecordBatch.from_pydict(columns), {}))
+        b"".join(frame_parts_of_batch("manoeuvres", pa.RecordBatch.from_pydict(columns), {}))
     )
     found = scene(canned("table", 2, folder), scan_rate_hz=4, offset_s="0.1")
     found["wires"].remove("eye -> part -> fusion")
@@ -235,12 +237,12 @@ def test_ten_thousand_calls_and_hundreds_of_megabytes(folder):
     link.start()
     batch = pa.RecordBatch.from_pydict({"x": np.arange(3.0)})
     empty = pa.RecordBatch.from_arrays([], schema=pa.schema([]))
-    link.ask(frame("hello", empty, {}), 5.0)
-    call = frame("call", batch, {})
+    link.ask(frame_parts_of_batch("hello", empty, {}), 5.0)
+    call = frame_parts_of_batch("call", batch, {})
     for _ in range(10_000):
         link.ask(call, 5.0)
     large = pa.RecordBatch.from_pydict({"x": np.random.default_rng(1).random(13_000_000)})
-    ((about, table),) = link.ask(frame("large", large, {}), 60.0)
+    ((about, table),) = link.ask(frame_parts_of_batch("large", large, {}), 60.0)
     assert (
         about["table"] == "large"
         and table.column("x").to_numpy()[-1] == large.column(0)[-1].as_py()

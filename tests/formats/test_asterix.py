@@ -19,7 +19,12 @@ from components.display.recorded_run import RecordedTables
 from components.export.asterix_export import asterix_bytes
 from components.export.command import export
 from components.formats.asterix_file import read_asterix_plots
-from components.formats.asterix_records import ADS_B, PLOTS, SYSTEM_TRACKS, read_records
+from components.formats.asterix_records import (
+    ADS_B,
+    PLOTS,
+    SYSTEM_TRACKS,
+    decode_records_with_notes,
+)
 from components.formats.text_rows import TrafficFileError
 from components.messages.state_tracks import COVARIANCE
 from dsa_des.errors import UsageError
@@ -187,7 +192,7 @@ def test_tracks_come_back_as_traffic(tmp_path):
 
 def test_velocities_and_statuses_keep_their_least_bits(tmp_path):
     run, _, _ = tracked_run()
-    records, notes = read_records(tmp_path, asterix_bytes(run))
+    records, notes = decode_records_with_notes(tmp_path, asterix_bytes(run))
     tracks = [r.values for r in records if r.category == SYSTEM_TRACKS]
     assert not notes and len(tracks) == 60
     assert [(t["velocity_north_m_s"], t["velocity_east_m_s"]) for t in tracks[:2]] == [
@@ -227,7 +232,7 @@ def test_what_aircraft_say_of_themselves_is_ads_b_and_no_plot(tmp_path):
         table = table.append_column(name, pa.array(values))
     path = tmp_path / "run.ast"
     path.write_bytes(asterix_bytes(RecordedTables(run.folder, {**run.tables, "detections": table})))
-    records, _ = read_records(path, path.read_bytes())
+    records, _ = decode_records_with_notes(path, path.read_bytes())
     first, second = (r for r in records if r.category == ADS_B)
     assert [r.category for r in records].count(PLOTS) == 1
     assert first.time_s == pytest.approx(86399.9, abs=TIME_S) and second.time_s > 86400.0

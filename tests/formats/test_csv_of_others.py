@@ -347,7 +347,7 @@ def test_a_table_that_a_shell_drew_is_read(tmp_path):
     for drawn in (impala, trino):
         path = tmp_path / "log.txt"
         path.write_text("\n".join(drawn))
-        (flown,) = known_kinds.record(path).flights().aircraft
+        (flown,) = known_kinds.recording_of_file(path).flights().aircraft
         assert flown.name == "a0d724" and flown.alt_m.tolist() == [1000.0] * 4
         assert flown.lat_deg.tolist() == [47.0, 47.001, 47.002, 47.003]
         assert flown.sample_times_s.tolist() == [0.0, 1.0, 2.0, 3.0]
@@ -367,7 +367,7 @@ def test_flightradar24_s_messages_are_thinned_to_a_second(tmp_path):
     """Receivers' clocks are wrong, zeros are no position, and 0 ft is the ground."""
     path = tmp_path / "t.csv"
     path.write_text(GRANULAR)
-    flown = known_kinds.record(path).flights()
+    flown = known_kinds.recording_of_file(path).flights()
     assert flown.start_time_s == 1704181263.515
     assert flown.ownship.name == "8467d8"
     assert flown.ownship.sample_times_s.tolist() == [0.0, 1.0]
@@ -404,12 +404,12 @@ def test_days_of_silence_are_a_gap_where_times_are_dates(tmp_path):
     for begins, days, taken in ((1.7e9, 40, True), (1.7e9, 400, False), (5.0, 2, False)):
         path.write_text(text.format(*(begins + k for k in (0, 1, 2, 86400 * days))))
         if taken:
-            own = known_kinds.record(path).flights(None).ownship
+            own = known_kinds.recording_of_file(path).flights(None).ownship
             assert own.away.tolist() == [False, False, True, False]
             assert own.sample_times_s[3] == 40 * 86400
             continue
         with pytest.raises(TrafficFileError, match="more than 86400 s, where it says dates 366"):
-            known_kinds.record(path)
+            known_kinds.recording_of_file(path)
 
 
 def test_a_unit_may_be_joined_to_a_name_by_its_capital(tmp_path):

@@ -26,7 +26,7 @@ def read(folder, content, name="log", **options):
 
 def record(folder, content):
     (folder / "log").write_text(json.dumps(content))
-    return known_kinds.record(folder / "log")
+    return known_kinds.recording_of_file(folder / "log")
 
 
 def snapshot(now, *aircraft):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from wired import chain, run
 
-from components.fusion.recent_detections import split_used_rows
+from components.fusion.recent_detections import whole_rows_and_new_detections
 
 SLOW = {"name": "slow", "north_m": 5000.0, "east_m": 700.0, "up_m": 150.0, "heading_deg": 190.0,
         "speed_mps": 60.0}  # fmt: skip
@@ -80,7 +80,7 @@ def test_rows_as_they_are_and_detections_by_themselves_by_hand():
     ranges = np.array([3, 4, 3, 4])
     made = np.array([10, 10, 12, 10, 9, 8])
     used = np.array([False] * 5 + [True])
-    whole, at, alone = split_used_rows(row, np.stack([angles, ranges]), made, used)
+    whole, at, alone = whole_rows_and_new_detections(row, np.stack([angles, ranges]), made, used)
     assert whole.tolist() == [0]
     # The second is of two instants; the third's range was used before, and both of the last.
     assert list(zip(at.tolist(), alone.tolist(), strict=True)) == [(0, 1), (0, 4), (1, 2)]

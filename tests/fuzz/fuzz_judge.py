@@ -157,7 +157,7 @@ def _simulate(argv: list[str]) -> None:
     @scene_options()
     @plain_errors
     def command(scene: str, sets: tuple[str, ...], swaps: tuple[str, ...], **options: str) -> None:
-        from dsa_des.commands.scene import load_printing_notes
+        from dsa_des.commands.scene import load_scene_printing_notes
         from dsa_des.files.toml_files import to_toml
         from dsa_des.record.recording import Recorder
         from dsa_des.record.sinks import MemorySink, ObserverSink
@@ -165,7 +165,7 @@ def _simulate(argv: list[str]) -> None:
         from dsa_des.running.simulation import Simulation
         from dsa_des.text.plain_json import json_text
 
-        loaded = load_printing_notes(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]
+        loaded = load_scene_printing_notes(scene, sets, swaps, options["seed"], options["duration"])  # type: ignore[arg-type]
         recorder = Recorder([MemorySink()])
         simulation = Simulation(loaded, recorder=recorder)
         warn_of_long_run(simulation)

@@ -11,7 +11,7 @@ from pydantic import ValidationError
 
 from dsa_des.block.registry import find_component, section_models
 from dsa_des.files.toml_files import to_toml
-from dsa_des.scene.block_table import split_options
+from dsa_des.scene.block_table import split_engine_and_own_keys
 
 VALUES = (
     1e-30, 1e-20, 1e-12, 1e-6, 1e-3, 0, 1, 1000, 1_000_000, 1e9, 1e12, 1e15, 1e18, 1e30, -1e-30,
@@ -93,7 +93,7 @@ def _fits(scene: dict[str, Any], path: tuple[str, ...]) -> bool:
     for part in path:
         table = table.get(part, {})
     if path[0] == "blocks":
-        _, own = split_options(table, find_component(table["type"]).Parameters)
+        _, own = split_engine_and_own_keys(table, find_component(table["type"]).Parameters)
         model = find_component(table["type"]).Parameters
     else:
         own, model = table, section_models()[path[0]]

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from components.geometry.angles import (
     TWO_PI,
-    heading_from_deg,
+    heading_rad_from_deg,
     longitude_difference_deg,
     remainder,
     wrap_by_sines,
@@ -117,7 +117,7 @@ def test_what_rounds_up_to_a_whole_turn_is_none():
     assert remainder(tiny, 360.0).tolist() == [0.0, 0.0, 1e-20]
     assert remainder(tiny, TWO_PI).tolist() == [0.0, 0.0, 1e-20]
     assert wrap_heading_rad(tiny).tolist() == [0.0, 0.0, 1e-20]
-    assert heading_from_deg(-143.0) == np.radians(217.0)
+    assert heading_rad_from_deg(-143.0) == np.radians(217.0)
 
 
 @fast

@@ -9,11 +9,11 @@ from hypothesis import strategies as st
 from components.geometry import (
     aspect_angles,
     body_angles,
+    body_angles_of_sight_line,
     body_to_ned,
     line_of_sight_in_target_axes,
     ned_to_body,
     relative_attitude,
-    sensor_angles,
     unit_vector,
 )
 
@@ -88,15 +88,17 @@ def test_straight_up_and_down():
             assert body_angles(x, y, z) == (0.0, q)
     assert body_angles(0.0, 0.0, 0.0) == (0.0, 0.0)
     assert body_angles(-1.0, -0.0, 0.0) == (np.pi, 0.0)
-    assert sensor_angles(1.0, np.pi / 2, 2.0, 0.0, 0.0) == (0.0, np.pi / 2)
-    assert sensor_angles(3.0, -np.pi / 2, 2.0, 0.0, 0.0) == (0.0, -np.pi / 2)
+    assert body_angles_of_sight_line(1.0, np.pi / 2, 2.0, 0.0, 0.0) == (0.0, np.pi / 2)
+    assert body_angles_of_sight_line(3.0, -np.pi / 2, 2.0, 0.0, 0.0) == (0.0, -np.pi / 2)
 
 
 @fast
 @given(st.floats(0, 6.28), st.floats(-1.5, 1.5), angle)
 def test_with_the_wings_level_both_models_agree(azimuth, elevation, yaw):
-    exact = unit_vector(*sensor_angles(azimuth, elevation, yaw, 0.0, 0.0))
-    small = unit_vector(*sensor_angles(azimuth, elevation, yaw, 0.0, 0.0, model="small_angle"))
+    exact = unit_vector(*body_angles_of_sight_line(azimuth, elevation, yaw, 0.0, 0.0))
+    small = unit_vector(
+        *body_angles_of_sight_line(azimuth, elevation, yaw, 0.0, 0.0, model="small_angle")
+    )
     assert np.linalg.norm(np.array(exact) - small) <= 2e-15
 
 
@@ -104,31 +106,33 @@ def test_with_the_wings_level_both_models_agree(azimuth, elevation, yaw):
 @given(angle, st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
 def test_dead_ahead_small_angle_is_exact_in_pitch(yaw, elevation, pitch):
     # also past straight up: the direction comes down behind
-    exact = unit_vector(*sensor_angles(yaw, elevation, yaw, pitch, 0.0))
-    small = unit_vector(*sensor_angles(yaw, elevation, yaw, pitch, 0.0, model="small_angle"))
+    exact = unit_vector(*body_angles_of_sight_line(yaw, elevation, yaw, pitch, 0.0))
+    small = unit_vector(
+        *body_angles_of_sight_line(yaw, elevation, yaw, pitch, 0.0, model="small_angle")
+    )
     assert np.linalg.norm(np.array(exact) - small) <= 2e-15
 
 
 def test_small_angle_errs_abeam_and_astern():
     pitch = 5 * DEG
-    assert sensor_angles(np.pi / 2, 0, 0, pitch, 0)[1] == pytest.approx(0, abs=1e-16)
-    assert sensor_angles(np.pi / 2, 0, 0, pitch, 0, model="small_angle")[1] == -pitch
-    assert sensor_angles(np.pi, 0, 0, pitch, 0)[1] == pytest.approx(pitch, rel=1e-14)
-    assert sensor_angles(np.pi, 0, 0, pitch, 0, model="small_angle")[1] == -pitch
+    assert body_angles_of_sight_line(np.pi / 2, 0, 0, pitch, 0)[1] == pytest.approx(0, abs=1e-16)
+    assert body_angles_of_sight_line(np.pi / 2, 0, 0, pitch, 0, model="small_angle")[1] == -pitch
+    assert body_angles_of_sight_line(np.pi, 0, 0, pitch, 0)[1] == pytest.approx(pitch, rel=1e-14)
+    assert body_angles_of_sight_line(np.pi, 0, 0, pitch, 0, model="small_angle")[1] == -pitch
 
 
 @fast
 @given(st.floats(-10, 10), angle, st.floats(-10, 10), angle, angle)
 def test_sensor_angles_are_valid_for_any_attitude(azimuth, elevation, yaw, pitch, roll):
     for model in ("exact", "small_angle"):
-        p, q = sensor_angles(azimuth, elevation, yaw, pitch, roll, model=model)
+        p, q = body_angles_of_sight_line(azimuth, elevation, yaw, pitch, roll, model=model)
         assert -np.pi < p <= np.pi
         assert -np.pi / 2 <= q <= np.pi / 2
 
 
 def test_unknown_model_is_named():
     with pytest.raises(ValueError, match="model is 'small': it must be 'exact' or 'small_angle'"):
-        sensor_angles(0, 0, 0, 0, 0, model="small")
+        body_angles_of_sight_line(0, 0, 0, 0, 0, model="small")
 
 
 def test_relative_attitude_is_equation_six_with_absolute_angles():
@@ -162,7 +166,12 @@ def test_aspect(line, attitude, aspect):
 def test_bits_do_not_depend_on_shape():
     rng = np.random.default_rng(1)
     cells = rng.uniform(-np.pi, np.pi, (5, 5000))
-    for function in (sensor_angles, aspect_angles, line_of_sight_in_target_axes, relative_attitude):
+    for function in (
+        body_angles_of_sight_line,
+        aspect_angles,
+        line_of_sight_in_target_axes,
+        relative_attitude,
+    ):
         whole = function(*cells)
         grid = function(*(c.reshape(100, 50).T for c in cells))
         for w, g in zip(whole, grid, strict=True):
@@ -175,9 +184,11 @@ def test_bits_do_not_depend_on_shape():
 
 
 def test_broadcasting():
-    p, q = sensor_angles([[0.1], [0.2]], 0.0, 0.0, [0.0, 0.1, 0.2], 0.0)
+    p, q = body_angles_of_sight_line([[0.1], [0.2]], 0.0, 0.0, [0.0, 0.1, 0.2], 0.0)
     assert p.shape == q.shape == (2, 3)
-    p, q = sensor_angles([[0.1], [0.2]], 0.0, 0.0, [0.0, 0.1, 2.2], [0.0], model="small_angle")
+    p, q = body_angles_of_sight_line(
+        [[0.1], [0.2]], 0.0, 0.0, [0.0, 0.1, 2.2], [0.0], model="small_angle"
+    )
     assert p.shape == q.shape == (2, 3)
     assert all(v.shape == (2,) for v in ned_to_body(1.0, 0.0, 0.0, 0.0, 0.0, [0.0, 1.0]))
 
@@ -197,6 +208,6 @@ def test_bad_attitude_is_named():
 def test_any_finite_input_is_silent(a, b, c, yaw, pitch, roll):
     with np.errstate(all="raise"):
         body_angles(*ned_to_body(a, b, c, yaw, pitch, roll))
-        sensor_angles(a, b, yaw, pitch, roll)
-        sensor_angles(a, b, yaw, pitch, roll, model="small_angle")
+        body_angles_of_sight_line(a, b, yaw, pitch, roll)
+        body_angles_of_sight_line(a, b, yaw, pitch, roll, model="small_angle")
         relative_attitude(a, b, yaw, pitch, roll)

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from components.geometry import (
+    body_angles_of_offsets,
+    body_angles_of_sight_line,
     direction_angle,
-    sensor_angles,
-    sensor_angles_of_offsets,
     sine_and_cosine,
     slope_angle,
 )
@@ -49,7 +49,7 @@ def test_straight_up_and_nowhere():
         -np.pi,
     ]
     level = np.zeros(3)
-    p, q = sensor_angles_of_offsets(level, level, np.array([5.0, -5.0, 0.0]), level, level, level)
+    p, q = body_angles_of_offsets(level, level, np.array([5.0, -5.0, 0.0]), level, level, level)
     assert p.tolist() == [0.0, 0.0, 0.0]
     assert q.tolist() == [np.pi / 2, -np.pi / 2, 0.0]
 
@@ -74,8 +74,8 @@ def test_offsets_give_the_angles_that_directions_give(level):
     pitch, roll = (np.zeros(3000) if level else draw.uniform(-1.5, 1.5, 3000) for _ in range(2))
     azimuth = np.arctan2(east, north)
     elevation = np.arctan2(up, np.hypot(north, east))
-    expected = sensor_angles(azimuth, elevation, yaw, pitch, roll)
-    got = sensor_angles_of_offsets(north, east, up, yaw, pitch, roll)
+    expected = body_angles_of_sight_line(azimuth, elevation, yaw, pitch, roll)
+    got = body_angles_of_offsets(north, east, up, yaw, pitch, roll)
 
     def vector(p, q):
         return np.array([np.cos(q) * np.cos(p), np.cos(q) * np.sin(p), np.sin(q)])
@@ -84,7 +84,7 @@ def test_offsets_give_the_angles_that_directions_give(level):
     # A row at a time says the same to the bit.
     for row in (0, 17, 2999):
         one = slice(row, row + 1)
-        alone = sensor_angles_of_offsets(
+        alone = body_angles_of_offsets(
             north[one], east[one], up[one], yaw[one], pitch[one], roll[one]
         )
         assert [alone[0][0], alone[1][0]] == [got[0][row], got[1][row]]

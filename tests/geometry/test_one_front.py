@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from components.geometry import ellipsoid, sensor_angles
+from components.geometry import body_angles_of_sight_line, ellipsoid
 from components.geometry.earth_models import ATTITUDE_MODELS, EARTH_MODELS, LineOfSight
 
 OWN = SimpleNamespace(
@@ -24,7 +24,7 @@ def test_body_angles_follow_from_the_line_in_ned(earth, attitude):
     seen = line.from_ownship(OWN, OTHER)
     places = (OWN.lat_deg, OWN.lon_deg, OWN.alt_m, OTHER.lat_deg, OTHER.lon_deg, OTHER.alt_m)
     np.testing.assert_allclose(seen[:3], line.in_ned(*places), rtol=1e-14)
-    body = sensor_angles(
+    body = body_angles_of_sight_line(
         *seen[:2], OWN.yaw_rad, OWN.pitch_rad, OWN.roll_rad, model=attitude
     )  # fmt: skip
     np.testing.assert_allclose(seen[3:], body, atol=1e-14)

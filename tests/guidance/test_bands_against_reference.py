@@ -10,7 +10,7 @@ import pytest
 from components.alert_configuration.conf_file import read_conf
 from components.formats.daa_file import read_daa_samples
 from components.geometry import east_north_m, east_north_mps
-from components.guidance.bands import GuidedIntruder, guidance, resolution
+from components.guidance.bands import GuidedIntruder, guidance, nearest_values_outside_red
 from components.guidance.situation import State
 from docs.make.published.degas_bands import equal_cells
 from tests.alerting.reference_data import reference_file
@@ -78,7 +78,7 @@ def compare_recovery(recovery, wanted):
 
 def compare_resolution(found, configuration, kind, wanted):
     region = configuration["corrective_region"]
-    got = resolution(found.bands, found.own_value, region, kind == "hdir")
+    got = nearest_values_outside_red(found.bands, found.own_value, region, kind == "hdir")
     if got is None:
         assert wanted["resolution_low"] == wanted["resolution_up"] == ""
         return

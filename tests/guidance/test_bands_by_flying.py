@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from components.alert_configuration.conf_file import default_values
+from components.alert_configuration.conf_file import default_values_and_units
 from components.guidance.altitudes import Altitudes
-from components.guidance.bands import resolution
+from components.guidance.bands import nearest_values_outside_red
 from components.guidance.intervals import (
     Band,
     Interval,
@@ -22,7 +22,7 @@ from components.guidance.situation import Detector, State
 from components.well_clear.relative_motion import nearly_equal
 from components.well_clear.volume import Volume, violates
 
-VALUES = {**default_values()[0], "max_alt": 2000.0, "max_hs": 150.0}
+VALUES = {**default_values_and_units()[0], "max_alt": 2000.0, "max_hs": 150.0}
 LOOKAHEAD_S, HORIZON_S, FLOWN_S = 150.0, 100.0, 0.02
 SIZES = (900.0, 140.0, 20.0, 5.0)
 
@@ -85,7 +85,7 @@ def test_both_sides_of_every_edge_are_as_they_are_flown(kind, variable):
         values = {**VALUES, "lookahead_time": LOOKAHEAD_S}
         made = manoeuvres_of_kind(kind, one_row(OWN), values)
         conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
-        clear = ~conflicts.is_unsafe(0.0, HORIZON_S)[0]
+        clear = ~conflicts.is_in_or_behind_conflict(0.0, HORIZON_S)[0]
         zero = int(np.argmin(np.abs(made.values[0] - made.own_value)))
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
             for at in (place, place + 1):
@@ -174,15 +174,19 @@ def test_worse_regions_are_painted_over_milder_ones():
 
 def test_the_nearer_way_out_is_preferred_and_right_where_they_are_equal():
     bands = [Band(0.0, 1.0, "NONE"), Band(1.0, 2.0, "MID"), Band(2.0, 2 * math.pi, "NONE")]
-    assert resolution(bands, 1.5, "MID", True) == (1.0, 2.0, True)
-    assert resolution(bands, 1.4, "MID", True) == (1.0, 2.0, False)
-    assert resolution(bands, 2.5, "MID", True) is None
-    assert resolution(bands, 1.5, "NEAR", True) is None
+    assert nearest_values_outside_red(bands, 1.5, "MID", True) == (1.0, 2.0, True)
+    assert nearest_values_outside_red(bands, 1.4, "MID", True) == (1.0, 2.0, False)
+    assert nearest_values_outside_red(bands, 2.5, "MID", True) is None
+    assert nearest_values_outside_red(bands, 1.5, "NEAR", True) is None
     across = [Band(0.0, 0.5, "NEAR"), Band(0.5, 6.0, "NONE"), Band(6.0, 2 * math.pi, "MID")]
-    left, right, prefers_right = resolution(across, 0.1, "MID", True)
+    left, right, prefers_right = nearest_values_outside_red(across, 0.1, "MID", True)
     assert (left, right, prefers_right) == (pytest.approx(6.0), 0.5, False)
     saturated = [Band(100.0, 700.0, "NEAR")]
-    assert resolution(saturated, 300.0, "MID", False) == (-math.inf, math.inf, False)
+    assert nearest_values_outside_red(saturated, 300.0, "MID", False) == (
+        -math.inf,
+        math.inf,
+        False,
+    )
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from components.alert_configuration.conf_file import default_values
+from components.alert_configuration.conf_file import default_values_and_units
 from components.alert_configuration.configuration import Alerter, Configuration, Level
 from components.guidance.bands import guidance_of_many
 from components.guidance.manoeuvre_kinds import KINDS
@@ -18,7 +18,7 @@ from tests.guidance.plain_guidance import Plain
 COUNT = 24
 DEG = math.pi / 180.0
 VALUES = {
-    **default_values()[0],
+    **default_values_and_units()[0],
     "lookahead_time": 90.0, "step_hdir": 7.0 * DEG, "step_hs": 8.0, "step_vs": 2.0,
     "step_alt": 130.0, "turn_rate": 2.6 * DEG, "horizontal_accel": 1.7, "vertical_accel": 1.1,
     "vertical_rate": 3.1,

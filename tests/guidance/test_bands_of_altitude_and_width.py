@@ -63,7 +63,7 @@ def test_altitudes_on_both_sides_of_every_edge_are_as_they_are_flown(climb):
     for intruder in (CROSSING, BELOW, NEAR, ABOVE):
         made = manoeuvres_of_kind("alt", one_row(own), values)
         conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
-        clear = ~conflicts.is_unsafe(0.0, LOOKAHEAD_S)[0]
+        clear = ~conflicts.is_in_or_behind_conflict(0.0, LOOKAHEAD_S)[0]
         for place in np.flatnonzero(clear[1:] != clear[:-1]):
             for at in (place, place + 1):
                 heights, rates = levelled_off(made.values[0, at], climb, float(own.up_m))
@@ -95,7 +95,7 @@ def test_altitudes_that_are_taken_at_once_meet_who_is_level_with_them_while_near
     made = manoeuvres_of_kind("alt", one_row(OWN), values)
     volume = Volume(*SIZES, "none")
     conflicts = made.find_conflicts(one_row(intruder).columns(), Detector(volume))
-    found = conflicts.is_unsafe(0.0, LOOKAHEAD_S)[0]
+    found = conflicts.is_in_or_behind_conflict(0.0, LOOKAHEAD_S)[0]
     time_s = np.linspace(0.0, LOOKAHEAD_S, 200_001)
     east, north, up = (float(intruder[i]) + float(intruder[3 + i]) * time_s for i in range(3))
     east -= float(OWN.east_m) + float(OWN.east_mps) * time_s

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from components.alert_configuration.conf_file import default_values
+from components.alert_configuration.conf_file import default_values_and_units
 from components.alert_configuration.configuration import Alerter, Configuration, Level
-from components.guidance.bands import GuidedIntruder, guidance, resolution
+from components.guidance.bands import GuidedIntruder, guidance, nearest_values_outside_red
 from components.guidance.intervals import FULL_TURN, Band, clear_intervals
 from components.guidance.memory import BandMemory, ResolutionMemory
 from components.guidance.recovery import Recovery
@@ -16,7 +16,8 @@ from components.well_clear.volume import Volume
 
 DEG = math.pi / 180.0
 VALUES = {
-    **default_values()[0], "corrective_region": "MID", "lookahead_time": 180.0, "min_alt": 100.0,
+    **default_values_and_units()[0], "corrective_region": "MID", "lookahead_time": 180.0,
+    "min_alt": 100.0,
     "max_alt": 4000.0, "step_alt": 30.0, "vertical_rate": 2.5, "vertical_accel": 2.5,
     "horizontal_nmac": 150.0, "vertical_nmac": 30.0,
 }  # fmt: skip
@@ -93,7 +94,7 @@ SLIVER = [(45.0, "NONE"), (45.009, "NEAR"), (90.0, "NONE")]
     ],
 )
 def test_a_sliver_beyond_north_is_lost_to_the_wider_tolerance_there(own_deg, line, way):
-    found = resolution(line, own_deg * DEG, "NEAR", True)
+    found = nearest_values_outside_red(line, own_deg * DEG, "NEAR", True)
     assert (found.low, found.high) == pytest.approx((way[0] * DEG, way[1] * DEG), abs=1e-12)
 
 
@@ -101,15 +102,17 @@ def test_a_sliver_beyond_north_is_lost_to_the_wider_tolerance_there(own_deg, lin
 def test_an_own_direction_a_hair_left_of_north_lies_in_the_first_band(own_deg, way):
     """2^40 doubles below 360 deg are 0.056 deg."""
     line = bands((0.0, "NEAR"), (40.0, "NONE"), (300.0, "NEAR"))
-    found = resolution(line, own_deg * DEG, "NEAR", True)
+    found = nearest_values_outside_red(line, own_deg * DEG, "NEAR", True)
     assert (found.low, found.high) == pytest.approx((way[0] * DEG, way[1] * DEG), abs=1e-12)
     assert found.prefers_high
     free = bands((0.0, "NONE"), (40.0, "NEAR"), (300.0, "NEAR"))
-    assert (resolution(free, own_deg * DEG, "NEAR", True) is None) == (own_deg == 359.97)
+    assert (nearest_values_outside_red(free, own_deg * DEG, "NEAR", True) is None) == (
+        own_deg == 359.97
+    )
 
 
 MEMORY = {
-    **default_values()[0], "hysteresis_time": 5.0, "persistence_time": 4.0,
+    **default_values_and_units()[0], "hysteresis_time": 5.0, "persistence_time": 4.0,
     "persistence_preferred_hdir": 15.0 * DEG, "persistence_preferred_alt": 250.0,
     "bands_persistence": True, "alerting_m": 2, "alerting_n": 2, "corrective_region": "NEAR",
 }  # fmt: skip
@@ -122,7 +125,7 @@ def test_a_way_out_is_near_an_earlier_one_only_beyond_the_tolerance(off_deg, kep
 
     def shown(now_s, edge_deg):
         line = bands((0.0, "NEAR"), (edge_deg, "NONE"), (250.0, "NEAR"))
-        way = resolution(line, 0.3 * DEG, "NEAR", True)
+        way = nearest_values_outside_red(line, 0.3 * DEG, "NEAR", True)
         return memory.step(now_s, way, line, 0.3 * DEG, None).high
 
     for now_s in range(6):
@@ -136,11 +139,11 @@ def test_a_remembered_direction_lies_on_its_side_up_to_nearly_half_a_turn(behind
     """2^40 doubles below 180 deg are 0.028 deg."""
     memory = ResolutionMemory(MEMORY, "hdir")
     line = bands((0.0, "NONE"), (80.0, "NEAR"), (200.0, "NONE"))
-    way = resolution(line, 150.0 * DEG, "NEAR", True)
+    way = nearest_values_outside_red(line, 150.0 * DEG, "NEAR", True)
     assert memory.step(0.0, way, line, 150.0 * DEG, None).high == 200.0 * DEG
     own = (200.0 - behind_deg) * DEG
     turned = bands((0.0, "NEAR"), (100.0, "NONE"), (300.0, "NEAR"))
-    way = resolution(turned, own, "NEAR", True)
+    way = nearest_values_outside_red(turned, own, "NEAR", True)
     shown = memory.step(1.0, way, turned, own, None).high
     assert shown == pytest.approx((200.0 if kept else 100.0) * DEG, abs=1e-12)
 

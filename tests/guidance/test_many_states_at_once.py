@@ -8,7 +8,7 @@ import pytest
 from components.alert_configuration.conf_file import read_conf
 from components.guidance.bands import GuidedIntruder, guidance, guidance_of_many
 from components.guidance.intervals import clear_intervals
-from components.guidance.regions import GuidedIntruders, has_interval
+from components.guidance.regions import GuidedIntruders, has_neighbouring_clear_values
 from components.guidance.situation import State
 from tests.alerting.conf_text import CONF
 
@@ -64,5 +64,5 @@ def test_whether_any_way_is_clear_goes_by_each_ones_own_limits():
     kind = SimpleNamespace(values=values, least=least, most=most, cyclic=False)
     rows = zip(values, clear, least, most, strict=True)
     alone = [bool(clear_intervals(*row, cyclic=False)) for row in rows]
-    assert has_interval(kind, clear).tolist() == alone
+    assert has_neighbouring_clear_values(kind, clear).tolist() == alone
     assert 5 < sum(alone) < COUNT - 5

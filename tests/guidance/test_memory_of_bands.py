@@ -6,7 +6,7 @@ import math
 import numpy as np
 import pytest
 
-from components.alert_configuration.conf_file import default_values, read_conf
+from components.alert_configuration.conf_file import default_values_and_units, read_conf
 from components.alerting.alert_tables import TABLE_UNITS, remove_hysteresis
 from components.alerting.encounter import read_encounter
 from components.alerting.levels import AlertPairs, alert_levels
@@ -19,7 +19,8 @@ from components.guidance.situation import State
 from tests.alerting.reference_data import reference_file
 
 VALUES = {
-    **default_values()[0], "hysteresis_time": 5.0, "persistence_time": 3.0, "alerting_m": 2,
+    **default_values_and_units()[0], "hysteresis_time": 5.0, "persistence_time": 3.0,
+    "alerting_m": 2,
     "alerting_n": 3, "bands_persistence": False, "persistence_preferred_vs": 2.0,
     "corrective_region": "MID",
 }  # fmt: skip

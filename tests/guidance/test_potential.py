@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from components.guidance.mvp import _others_by_target
+from components.guidance.mvp import _others_own_velocities_and_mask
 from components.guidance.potential import (
     KeptApart,
     Others,
     conflict_mask,
     may_resume,
-    push_velocity,
+    velocity_after_push,
 )
 from components.messages.alerts import AlertLevels
 
@@ -66,7 +66,7 @@ def drawn(seed, n=400, others=3):
 def test_all_three_follow_the_formulas_pair_by_pair():
     others, own = drawn(1)
     now, done = conflict_mask(others, KEPT), may_resume(others, own, KEPT)
-    out = push_velocity(others, own, now, KEPT)
+    out = velocity_after_push(others, own, now, KEPT)
     assert 0.2 < now.mean() < 0.8 and 0.02 < done.mean() < 0.8
     for k in range(own.shape[1]):
         x, y = own[:, k].tolist()
@@ -87,8 +87,8 @@ def one(rx, ry, ux, uy):
 def test_two_head_on_turn_to_the_same_side_and_miss_by_the_larger_radius():
     mine, theirs = np.array([[0.0], [10.0]]), np.array([[0.0], [-10.0]])
     push = np.array([[True]])
-    a = push_velocity(one(0, 1450, 0, -20), mine, push, KEPT)[:, 0]
-    b = push_velocity(one(0, -1450, 0, 20), theirs, push, KEPT)[:, 0]
+    a = velocity_after_push(one(0, 1450, 0, -20), mine, push, KEPT)[:, 0]
+    b = velocity_after_push(one(0, -1450, 0, 20), theirs, push, KEPT)[:, 0]
     np.testing.assert_allclose(a, -b)  # each the other's image through the middle
     assert a[0] < 0.0  # to the left of the line, for both
     # By one alone the line touches the circle of 52.5 m, less what a tenth of a metre is off.
@@ -98,7 +98,7 @@ def test_two_head_on_turn_to_the_same_side_and_miss_by_the_larger_radius():
 
 @pytest.mark.parametrize("offset_m", [-40.0, -5.0, 5.0, 40.0])
 def test_who_passes_on_one_side_is_given_more_room_there(offset_m):
-    out = push_velocity(
+    out = velocity_after_push(
         one(offset_m, 1000, 0, -20), np.array([[0.0], [10.0]]), np.array([[True]]), KEPT
     )
     assert np.sign(out[0, 0]) == -np.sign(offset_m)
@@ -112,7 +112,7 @@ def test_inside_already_the_push_is_what_is_missing_of_the_radius():
     side, along = 12.0, math.sqrt(30.0**2 - 12.0**2)
     inside = one(side, along, 0, -along)
     assert conflict_mask(inside, KEPT).all()
-    out = push_velocity(inside, np.array([[3.0], [4.0]]), np.array([[True]]), KEPT)
+    out = velocity_after_push(inside, np.array([[3.0], [4.0]]), np.array([[True]]), KEPT)
     np.testing.assert_allclose(out[:, 0], [3.0 - 40.5, 4.0])
 
 
@@ -142,7 +142,7 @@ def test_what_alerts_say_stands_by_contact(tracks):
         own_motion = {"east_mps": np.array([10.0, 20.0]), "north_mps": np.array([30.0, 40.0])}
 
     alerts, nan = Alerts([None, None]), math.nan
-    others, own, heard = _others_by_target(alerts, alerts.contact_numbers())
+    others, own, heard = _others_own_velocities_and_mask(alerts, alerts.contact_numbers())
     assert heard.tolist() == [[True, False], [False, True]]
     np.testing.assert_array_equal(
         others.position_m, [[[-1.0, nan], [nan, -3.0]], [[-4.0, nan], [nan, -6.0]]]

@@ -17,7 +17,7 @@ from components.atmosphere.slant_path import (
 )
 from components.atmosphere.standard_atmosphere import standard_atmosphere
 from components.atmosphere.visibility import fog_visibility_m
-from components.navigation.errors import displaced_position
+from components.navigation.errors import displaced_lat_lon_alt
 from components.radar.beam import illumination_offset_s
 from components.radar.detection.clutter import clutter_detection_probability
 from components.radar.detection.detector_output import false_alarm_count
@@ -139,7 +139,7 @@ EDGES = [
     ),
     (
         "an error at the pole itself",
-        lambda: displaced_position(90.0, 0.0, 0.0, 0.0, 0.0, 5.0)[0],
+        lambda: displaced_lat_lon_alt(90.0, 0.0, 0.0, 0.0, 0.0, 5.0)[0],
         90.0,
         0.0,
     ),

@@ -76,8 +76,10 @@ def worst_gram_charlier(pulses):
 def meetings(first, second, seconds):
     """Scans of two clocks at one instant."""
     specs = [ClockSpec(parse_rational(rate)) for rate in (first, second)]
-    ticks = common_ticks_per_second([time for spec in specs for time in spec.exact_times()])
-    scans = [ScanClock(spec, ticks).between(0, seconds * ticks)[1] for spec in specs]
+    ticks = common_ticks_per_second(
+        [time for spec in specs for time in spec.times_needing_whole_ticks()]
+    )
+    scans = [ScanClock(spec, ticks).scans_between(0, seconds * ticks)[1] for spec in specs]
     return np.intersect1d(scans[0], scans[1]).size
 
 

@@ -10,7 +10,7 @@ from components.geometry import FieldOfView, ellipsoid
 from components.geometry.angles import longitude_difference_deg
 from components.geometry.attitude import body_angles, relative_attitude
 from components.geometry.earth_models import EARTH_MODELS, LineOfSight
-from components.geometry.sensor_axes import sensor_angles
+from components.geometry.sensor_axes import body_angles_of_sight_line
 
 DEG = math.pi / 180
 
@@ -157,7 +157,7 @@ SENSOR = [
 
 @pytest.mark.parametrize(("angles", "expected", "source"), SENSOR)
 def test_sensor_angles(angles, expected, source):
-    got = sensor_angles(*(a * DEG for a in angles))
+    got = body_angles_of_sight_line(*(a * DEG for a in angles))
     np.testing.assert_allclose(np.degrees(got), expected, rtol=0, atol=1e-13)
 
 

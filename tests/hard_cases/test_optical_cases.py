@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.aircraft.aspect_tables import table_from_nodes
+from components.aircraft.aspect_tables import silhouette_table_from_nodes
 from components.optical.mesh import TriangleMesh
 from components.optical.signature import (
     confidence,
@@ -264,7 +264,7 @@ def _table_with_a_hole():
     nodes = [
         (az, el, 1.0) for az in (0, 90, 180, 270) for el in (-90, 0, 90) if (az, el) != (90, 0)
     ]
-    table_from_nodes(*np.array(nodes).T)
+    silhouette_table_from_nodes(*np.array(nodes).T)
 
 
 def _open_mesh():

@@ -14,7 +14,7 @@ from components.geometry import ellipsoid
 from components.geometry.earth_models import LineOfSight
 from components.geometry.ellipsoid import enu_to_geodetic
 from components.geometry.error_bounds import max_true_range_m
-from components.line_of_sight.model_choice import convert_model_ranges
+from components.line_of_sight.model_choice import convert_range_to_seeming
 from components.messages.reach import FarthestLook
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -96,8 +96,8 @@ def test_nothing_is_proven_at_a_pole_and_the_exact_form_needs_no_proof() -> None
     assert max_true_range_m("flat_earth", 15e3, (89.95, 89.99), (0.0, 100.0)) == math.inf
     offer = KnownTraffic(Roster.from_pairs([]), lambda _reach, _lasts: envelope)
     context: Any = SimpleNamespace(producers=[SimpleNamespace(offer=offer)])
-    assert convert_model_ranges(context, "flat_earth", look).seeming == (("flat_earth", 15e3),)
-    assert convert_model_ranges(context, "ellipsoid", look) == look
+    assert convert_range_to_seeming(context, "flat_earth", look).seeming == (("flat_earth", 15e3),)
+    assert convert_range_to_seeming(context, "ellipsoid", look) == look
     assert not offer.is_envelope_used
     unknown: Any = SimpleNamespace(producers=[SimpleNamespace(offer=None)])
-    assert convert_model_ranges(unknown, "flat_earth", look) == FarthestLook(math.inf)
+    assert convert_range_to_seeming(unknown, "flat_earth", look) == FarthestLook(math.inf)

@@ -9,7 +9,7 @@ from same_runs import same_as_alone
 from components.radar.swerling import SwerlingRadar
 from components.radar.weather import Rain
 from components.tracking.stub import TrackerStub
-from dsa_des.arrays.run_ticks import single_run_numbers
+from dsa_des.arrays.run_ticks import shared_zero_run_numbers
 from dsa_des.block.component import Component, Input
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.errors import BlockFailure
@@ -138,7 +138,7 @@ class Unsaid(CountingByRun):
 
     def run(self, wake):
         tracks = super().run(wake)
-        return None if tracks is None else tracks.with_runs(single_run_numbers(len(tracks)))
+        return None if tracks is None else tracks.with_runs(shared_zero_run_numbers(len(tracks)))
 
 
 def with_tracker(tmp_path, kind):

@@ -13,8 +13,8 @@ from dsa_des.block.message import Message
 from dsa_des.block.wake import Wake
 from dsa_des.replicas.changed_scene import Replica, replica_scene
 from dsa_des.replicas.lockstep import NotInLockStep, make_lockstep_simulation
-from dsa_des.replicas.replicas import Recorded, lock_step_refusal, run_replicas
-from dsa_des.replicas.split_block import SplitBlock, _rows_of_replica
+from dsa_des.replicas.replicas import Recorded, reason_against_lock_step, run_replicas
+from dsa_des.replicas.split_block import SplitBlock, _wake_of_replica
 from dsa_des.scene.scene import load_scene
 
 FIRST_LIGHT = "configs/first_light.toml"
@@ -68,7 +68,7 @@ def test_a_clock_in_some_replicas_only_is_run_one_by_one():
     _, alone = tables_of(replica_scene(scene, replicas[1]))
     got, wanted = outcomes[1].tables["detections"]["tick"], alone["detections"]["tick"]
     assert got.tolist() == wanted.to_pylist()
-    assert "in some replicas only" in lock_step_refusal(scene, replicas)
+    assert "in some replicas only" in reason_against_lock_step(scene, replicas)
 
 
 DELAYED = (
@@ -133,13 +133,13 @@ def test_a_replica_that_was_sent_nothing_yet_holds_nothing():
     message = Message(np.array([2, 4], dtype=np.int64), run=np.array([0, 1]))
     held = {"cue": (message, np.array([0, 0, -1, 1]))}
     wake = Wake(RunTicks(run, ticks), np.full(4, -1), 1, held, {})
-    of_first, rows = _rows_of_replica(wake, slice(0, 2), 0).held("cue")
+    of_first, rows = _wake_of_replica(wake, slice(0, 2), 0).held("cue")
     assert of_first.tick.tolist() == [2] and rows.tolist() == [0, 0]
-    of_second, rows = _rows_of_replica(wake, slice(2, 4), 1).held("cue")
+    of_second, rows = _wake_of_replica(wake, slice(2, 4), 1).held("cue")
     assert of_second.tick.tolist() == [4] and rows.tolist() == [-1, 0]
     last = RunTicks(run[2:3], ticks[2:3])
     nothing = Wake(last, np.full(1, -1), 1, {"cue": (message, np.array([-1]))}, {})
-    assert _rows_of_replica(nothing, slice(0, 1), 1).held("cue") is None
+    assert _wake_of_replica(nothing, slice(0, 1), 1).held("cue") is None
 
 
 def test_what_comes_between_scans_waits_for_the_instance(monkeypatch):

@@ -30,7 +30,7 @@ def as_held(runs, sent, asked, longest, horizon=None, *, initial=False):
         new, now = inside(sent, start, end), inside(asked, start, end)
         if len(new):
             channel.push(Message(new.tick, run=new.run))
-        found = channel.sample(now, end) if len(now) else None
+        found = channel.held_rows_at_instants(now, end) if len(now) else None
         rows = np.full(len(now), -1) if found is None else found[1]
         for run, tick, row in zip(now.run, now.tick, rows, strict=True):
             came = [(run, t) for t in sent[run] if t <= tick]

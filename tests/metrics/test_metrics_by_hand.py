@@ -12,11 +12,11 @@ import pytest
 from components.metrics.losses import (
     displacements_around,
     find_closest_approach,
-    first_losses_s,
     first_times_inside,
+    flight_times_first_within_s,
     nearest_ranges_and_times,
 )
-from components.metrics.separation import Separation, distances_m, relative_flights
+from components.metrics.separation import Separation, range_horizontal_vertical_m, relative_flights
 from components.well_clear.volume import PRESETS
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Text
@@ -184,7 +184,7 @@ def test_flights_together_are_as_each_alone(small: Path) -> None:
     range_m, time_s = nearest_ranges_and_times(flights)
     alone = [find_closest_approach(flight)[:2] for flight in flights]
     assert list(zip(range_m.tolist(), time_s.tolist(), strict=True)) == alone
-    found = first_losses_s(flights, WELL_CLEAR_M, NMAC_M)
+    found = flight_times_first_within_s(flights, WELL_CLEAR_M, NMAC_M)
     for flight, (lost_s, _) in zip(flights[:3], found.tolist(), strict=False):
         times = np.arange(0.0, flight.end_s, 1e-3)
         apart = flight.separation_at(times)
@@ -202,7 +202,7 @@ def test_distances_of_f3442_are_exclusive() -> None:
     assert pytest.approx((609.6, 76.2)) == WELL_CLEAR_M and pytest.approx((152.4, 30.48)) == NMAC_M
     inside = Separation("x", np.arange(3.0), np.full(3, 700.0), np.array([609.6, 609.5, 0.0]),
                         np.array([0.0, 76.2, 76.1]))  # fmt: skip
-    flight = SimpleNamespace(pieces=lambda: iter([inside]), between_samples=False)
+    flight = SimpleNamespace(separations_by_piece=lambda: iter([inside]), between_samples=False)
     lost, never = first_times_inside(flight, WELL_CLEAR_M, (1.0, 0.5))
     assert lost == 2.0
     assert np.isnan(never)
@@ -214,7 +214,7 @@ def test_a_loss_of_the_smaller_volume_is_looked_for_after_that_of_the_larger() -
         Separation("x", 2.0 * k + np.arange(2.0), far_m, far_m, np.zeros(2))
         for k, far_m in enumerate(np.array([[900.0, 600.0], [500.0, 400.0], [150.0, 140.0]]))
     ]
-    flight = SimpleNamespace(pieces=lambda: iter(pieces), between_samples=False)
+    flight = SimpleNamespace(separations_by_piece=lambda: iter(pieces), between_samples=False)
     assert first_times_inside(flight, WELL_CLEAR_M, NMAC_M) == [1.0, 4.0]
     assert first_times_inside(flight, NMAC_M, WELL_CLEAR_M) == [4.0, 1.0]
 
@@ -226,7 +226,7 @@ def test_distances_do_not_depend_on_the_pieces_they_come_in(
 
     def found() -> tuple[Any, ...]:
         (flight,) = relative_flights(scene, 0.13)
-        time_s = np.concatenate([piece.time_s for piece in flight.pieces()])
+        time_s = np.concatenate([piece.time_s for piece in flight.separations_by_piece()])
         return (
             time_s.tolist(),
             find_closest_approach(flight),
@@ -344,7 +344,7 @@ def test_distances_are_there_only_where_both_are():
                         present=present)
         for east, up, present in zip((0.0, 1e-3), (400.0, 100.0), there, strict=True)
     )  # fmt: skip
-    slant, level, height = distances_m(own, other)
+    slant, level, height = range_horizontal_vertical_m(own, other)
     # On the equator, a thousandth of a degree of a circle of 6,378,137 m and some 250 m.
     chord = (6378137.0 + 250.0) * math.radians(1e-3)
     for found, wanted in ((slant, math.hypot(chord, 300.0)), (level, chord), (height, 300.0)):

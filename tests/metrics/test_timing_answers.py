@@ -14,7 +14,7 @@ from components.metrics.track_quality import age_quantile_s, mean_age_s, mean_in
 from dsa_des.cli import main
 from dsa_des.scene.scene import load_scene
 from dsa_des.studies.chunk import run_chunk
-from dsa_des.studies.runner import tables_of
+from dsa_des.studies.runner import result_tables_of_study
 from dsa_des.studies.study import Study
 from dsa_des.studies.study_digest import record_of
 from dsa_des.studies.study_file import read_study
@@ -45,7 +45,7 @@ class Finished:
 
 def lines_of(name: str, *sets: str) -> dict[tuple[str, tuple[object, ...]], object]:
     study = read_study(READY / name, sets=("runs_per_chunk=100", *sets))
-    tables = tables_of(study, Finished(study))  # type: ignore[arg-type]
+    tables = result_tables_of_study(study, Finished(study))  # type: ignore[arg-type]
     assert tables.rows.failed == 0
     return {(line.result.name, line.at): line for line in tables.lines}
 
@@ -200,7 +200,7 @@ def test_a_changed_encounter_file_is_another_study(tmp_path: Path) -> None:
 
 def test_pairs_narrow_the_swap_of_fusion_three_times() -> None:
     study = read_study(READY / "fusion_gate.toml", sets=["replicas=12", "runs_per_chunk=100"])
-    tables = tables_of(study, Finished(study))  # type: ignore[arg-type]
+    tables = result_tables_of_study(study, Finished(study))  # type: ignore[arg-type]
     drawn = {str(figure.metric) for figure in study.figures}
     narrower = {c.result.name: c.difference.narrowing_factor for c in tables.compared}
     assert max(narrower[name] for name in drawn) >= 3

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from components.navigation.errors import add_navigation_variances, displaced_position
+from components.navigation.errors import add_navigation_variances, displaced_lat_lon_alt
 
 
 @settings(derandomize=True, deadline=None, max_examples=100)
@@ -23,7 +23,7 @@ from components.navigation.errors import add_navigation_variances, displaced_pos
     down=st.floats(-30, 30),
 )
 def test_position_is_displaced_as_pymap3d_says(lat, lon, north, east, down):
-    ours = displaced_position(lat, lon, 1000.0, north, east, down)
+    ours = displaced_lat_lon_alt(lat, lon, 1000.0, north, east, down)
     truth = pymap3d.ned2geodetic(north, east, down, lat, lon, 1000.0)
     apart = pymap3d.geodetic2ned(*ours, *truth)
     # The tangent plane lies e²/2R above the ellipsoid, 0.14 mm for 42 m.
@@ -33,11 +33,11 @@ def test_position_is_displaced_as_pymap3d_says(lat, lon, north, east, down):
 
 
 def test_position_across_the_pole():
-    lat, lon, alt = displaced_position(90 - 1e-4, 20.0, 0.0, 30.0, 0.0, 0.0)
+    lat, lon, alt = displaced_lat_lon_alt(90 - 1e-4, 20.0, 0.0, 30.0, 0.0, 0.0)
     assert lon % 360 == pytest.approx(200.0)
     assert 90 - lat == pytest.approx(30.0 / 111_694 - 1e-4, abs=1e-9)
     assert alt == 0.0
-    at_pole = displaced_position(90.0, 0.0, 0.0, 0.0, 30.0, 0.0)
+    at_pole = displaced_lat_lon_alt(90.0, 0.0, 0.0, 0.0, 30.0, 0.0)
     assert at_pole[:2] == pytest.approx((90 - 30.0 / 111_694, 90.0), abs=1e-9)
 
 
@@ -103,17 +103,20 @@ def test_a_report_errs_by_what_it_moves_if_the_pose_is_another(position_m, attit
 def test_without_error_every_bit_stays():
     rng = np.random.Generator(np.random.PCG64(8))
     truth = (rng.uniform(-90, 90, 99), rng.uniform(-720, 720, 99), rng.uniform(-100, 1e4, 99))
-    for true, believed in zip(truth, displaced_position(*truth, 0.0, 0.0, 0.0), strict=True):
+    for true, believed in zip(truth, displaced_lat_lon_alt(*truth, 0.0, 0.0, 0.0), strict=True):
         np.testing.assert_array_equal(true, believed)
 
 
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda: displaced_position(91.0, 0.0, 0.0, 0.0, 0.0, 0.0), "lat_deg is 91"),
-        (lambda: displaced_position(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0), "lat_deg is nan"),
-        (lambda: displaced_position(0.0, 0.0, 0.0, 0.0, math.inf, 0.0), "east_m is inf"),
-        (lambda: displaced_position(0.0, 0.0, 0.0, 0.0, 1e6, 0.0), "position error is 1000000.0"),
+        (lambda: displaced_lat_lon_alt(91.0, 0.0, 0.0, 0.0, 0.0, 0.0), "lat_deg is 91"),
+        (lambda: displaced_lat_lon_alt(math.nan, 0.0, 0.0, 0.0, 0.0, 0.0), "lat_deg is nan"),
+        (lambda: displaced_lat_lon_alt(0.0, 0.0, 0.0, 0.0, math.inf, 0.0), "east_m is inf"),
+        (
+            lambda: displaced_lat_lon_alt(0.0, 0.0, 0.0, 0.0, 1e6, 0.0),
+            "position error is 1000000.0",
+        ),
     ],
 )
 def test_bad_input_is_named(call, words):
@@ -127,7 +130,7 @@ def test_a_displacement_is_as_long_at_the_height_it_leads_to(down_m):
     pymap3d = pytest.importorskip("pymap3d")
     here = (-41.3, -179.9, 2400.0)
     north_m, east_m = 900.0, -1100.0
-    lat, lon, alt = displaced_position(*here, north_m, east_m, down_m)
+    lat, lon, alt = displaced_lat_lon_alt(*here, north_m, east_m, down_m)
     east, north, up = pymap3d.geodetic2enu(float(lat), float(lon), float(alt), *here)
     assert (east, north) == pytest.approx((east_m, north_m), abs=0.05)
     assert up == pytest.approx(-down_m, abs=0.2)

@@ -5,14 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from components.arguments.checks import LARGEST, check_angle_rad, check_squarable, finite
+from components.arguments.checks import LARGEST, check_angle_rad, check_finite, check_squarable
 
 numbers = st.floats(allow_nan=False, allow_infinity=False)
 bad = pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, "far", None, [1.0, np.nan]])
 
 
 @bad
-@pytest.mark.parametrize("check", [finite, check_squarable, check_angle_rad])
+@pytest.mark.parametrize("check", [check_finite, check_squarable, check_angle_rad])
 def test_what_is_no_number_is_refused_by_name(check, value):
     with pytest.raises(ValueError, match=r"^range_m is "):
         check("range_m", value)
@@ -20,7 +20,7 @@ def test_what_is_no_number_is_refused_by_name(check, value):
 
 @given(numbers)
 def test_finite_takes_any_size_as_it_is(value):
-    assert float(finite("x", value)) == value
+    assert float(check_finite("x", value)) == value
 
 
 @given(numbers)

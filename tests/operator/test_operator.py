@@ -11,7 +11,13 @@ from scipy import stats
 from test_avoidance_by_bands import scene as by_bands
 from wired import rows, run
 
-from components.operator.pilot_model import CLIMB, TURN, Draws, commanded_change, response_delays_s
+from components.operator.pilot_model import (
+    CLIMB,
+    TURN,
+    Draws,
+    commanded_change_out_of_band,
+    reaction_and_execution_delays_s,
+)
 from dsa_des import load_scene
 from dsa_des.errors import SceneError
 
@@ -134,11 +140,11 @@ def uniforms(count):
 
 def test_response_times_are_distributed_as_published():
     draws = np.stack([uniforms(4000), np.roll(uniforms(4000), 7), np.roll(uniforms(4000), 99)], 1)
-    waits = [sum(response_delays_s(row, 5.0, 0.0, 0.0)) for row in draws]
+    waits = [sum(reaction_and_execution_delays_s(row, 5.0, 0.0, 0.0)) for row in draws]
     assert stats.kstest(waits, stats.expon(scale=5.0).cdf).pvalue > 0.01
-    waits = [sum(response_delays_s(row, 0.0, 11.0, 0.0)) for row in draws]
+    waits = [sum(reaction_and_execution_delays_s(row, 0.0, 11.0, 0.0)) for row in draws]
     assert stats.kstest(waits, stats.gamma(5.5, scale=2.0).cdf).pvalue > 0.01
-    both = [sum(response_delays_s(row, 5.0, 11.0, 3.0)) for row in draws]
+    both = [sum(reaction_and_execution_delays_s(row, 5.0, 11.0, 3.0)) for row in draws]
     assert np.mean(both) == pytest.approx(19.0, abs=0.3)
 
 
@@ -150,7 +156,7 @@ def test_response_times_are_distributed_as_published():
     ],
 )
 def test_sizes_are_distributed_as_published(changes, turns, shape, scale, less, unit):
-    size = [commanded_change(changes, turns, Draws(0.0, 0.0, u)) for u in uniforms(500)]
+    size = [commanded_change_out_of_band(changes, turns, Draws(0.0, 0.0, u)) for u in uniforms(500)]
     side = -1.0 if -changes[0] < changes[1] else 1.0
     nearest = min(-changes[0], changes[1])
     drawn = np.maximum(
@@ -161,20 +167,27 @@ def test_sizes_are_distributed_as_published(changes, turns, shape, scale, less, 
 
 def test_the_side_is_the_smaller_one_four_times_of_five():
     near = (-0.30, 0.40)
-    left = [commanded_change(near, True, Draws(u, 0.99, 0.5)) < 0.0 for u in uniforms(1000)]
+    left = [
+        commanded_change_out_of_band(near, True, Draws(u, 0.99, 0.5)) < 0.0 for u in uniforms(1000)
+    ]
     assert np.mean(left) == pytest.approx(0.8, abs=0.002)
-    left = [commanded_change(near, True, Draws(0.9, u, 0.5)) < 0.0 for u in uniforms(1000)]
+    left = [
+        commanded_change_out_of_band(near, True, Draws(0.9, u, 0.5)) < 0.0 for u in uniforms(1000)
+    ]
     assert np.mean(left) == pytest.approx(0.6, abs=0.002)
     down = [
-        commanded_change((-60.0, 50.0), False, Draws(0.9, u, 0.5)) < 0.0 for u in uniforms(1000)
+        commanded_change_out_of_band((-60.0, 50.0), False, Draws(0.9, u, 0.5)) < 0.0
+        for u in uniforms(1000)
     ]
     assert np.mean(down) == pytest.approx(0.5, abs=0.002)
-    assert commanded_change(near, True, None) == pytest.approx(-0.30 - TURN.fixed)
-    assert commanded_change((-0.3, 0.3), True, None) == pytest.approx(0.3 + TURN.fixed)
-    assert commanded_change((-3.0, 3.1), True, None) == -math.pi
-    assert commanded_change((-math.inf, 0.2), True, Draws(0.9, 0.0, 0.5)) > 0.0
-    assert commanded_change((-math.inf, math.inf), True, None) == 0.0
-    assert commanded_change((-10.0, 20.0), False, None) == pytest.approx(-10.0 - CLIMB.fixed)
+    assert commanded_change_out_of_band(near, True, None) == pytest.approx(-0.30 - TURN.fixed)
+    assert commanded_change_out_of_band((-0.3, 0.3), True, None) == pytest.approx(0.3 + TURN.fixed)
+    assert commanded_change_out_of_band((-3.0, 3.1), True, None) == -math.pi
+    assert commanded_change_out_of_band((-math.inf, 0.2), True, Draws(0.9, 0.0, 0.5)) > 0.0
+    assert commanded_change_out_of_band((-math.inf, math.inf), True, None) == 0.0
+    assert commanded_change_out_of_band((-10.0, 20.0), False, None) == pytest.approx(
+        -10.0 - CLIMB.fixed
+    )
 
 
 def test_a_turn_that_no_flight_can_have_is_refused_before_the_run(tmp_path):

@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 
 from components.aircraft.aspect_tables import (
     SilhouetteTable,
-    read_aspect_table,
-    table_from_nodes,
+    read_silhouette_table,
+    silhouette_table_from_nodes,
 )
 from components.optical.silhouette import visible_area
 
@@ -35,7 +35,7 @@ def write(path, rows, header="az_deg,el_deg,area_m2"):
 
 
 def test_reads_nodes_in_any_order_and_with_360_repeated(tmp_path, rows):
-    table = read_aspect_table(write(tmp_path / "a.csv", rows[::-1]))
+    table = read_silhouette_table(write(tmp_path / "a.csv", rows[::-1]))
     assert table.area_m2.shape == (7, 12)
     for az, el, area in rows:
         assert table.area(np.radians(az), np.radians(el)) == pytest.approx(area, rel=1e-13)
@@ -46,7 +46,7 @@ def test_reads_nodes_in_any_order_and_with_360_repeated(tmp_path, rows):
     [("area", 1.0), ("a_m2", 1.0), (" AREA_M2 ", 1.0), ("a_ft", 0.09290304), ("a_ft2", 0.09290304)],
 )
 def test_column_name_carries_the_unit(tmp_path, rows, column, unit):
-    table = read_aspect_table(write(tmp_path / "a.csv", rows, f"az_deg, el_deg,{column}"))
+    table = read_silhouette_table(write(tmp_path / "a.csv", rows, f"az_deg, el_deg,{column}"))
     assert table.area(0.0, 0.0) == pytest.approx(23.0 * unit, rel=1e-14)
 
 
@@ -57,7 +57,9 @@ def test_extra_columns_comments_and_blank_lines(tmp_path):
             text += f"x,{el},{az},{lopsided(az, el)}\n"
     path = tmp_path / "a.csv"
     path.write_text("\ufeff" + text, encoding="utf-8")
-    assert read_aspect_table(path).area(np.radians(120.0), 0.0) == pytest.approx(lopsided(120, 0))
+    assert read_silhouette_table(path).area(np.radians(120.0), 0.0) == pytest.approx(
+        lopsided(120, 0)
+    )
 
 
 @pytest.mark.parametrize(
@@ -74,7 +76,7 @@ def test_extra_columns_comments_and_blank_lines(tmp_path):
     ],
 )
 def test_silhouette_call_looks_from_the_observers_side(rows, view, seen_from):
-    table = table_from_nodes(*np.array(rows).T)
+    table = silhouette_table_from_nodes(*np.array(rows).T)
     area = visible_area(*view, model="aspect_table", table=table)
     assert area == pytest.approx(lopsided(*seen_from), rel=1e-12)
 
@@ -93,7 +95,7 @@ def test_interpolation_wraps_and_stays_between_its_nodes(azimuth, elevation):
 
 
 def test_bilinear_in_the_cell_across_360(rows):
-    table = table_from_nodes(*np.array(rows).T)
+    table = silhouette_table_from_nodes(*np.array(rows).T)
     expected = 0.25 * (lopsided(330, 0) * 1.5 + lopsided(0, 0) * 0.5)
     expected += 0.25 * (lopsided(330, 30) * 1.5 + lopsided(0, 30) * 0.5)
     assert table.area(np.radians(337.5), np.radians(15.0)) == pytest.approx(expected)
@@ -131,7 +133,7 @@ def without(rows, test):
 )
 def test_holes_and_bad_cells_are_named(tmp_path, rows, spoil, says):
     with pytest.raises(ValueError, match=says):
-        read_aspect_table(write(tmp_path / "a.csv", spoil(rows)))
+        read_silhouette_table(write(tmp_path / "a.csv", spoil(rows)))
 
 
 @pytest.mark.parametrize(
@@ -140,7 +142,7 @@ def test_holes_and_bad_cells_are_named(tmp_path, rows, spoil, says):
 )
 def test_missing_columns_are_named(tmp_path, rows, header, says):
     with pytest.raises(ValueError, match=says):
-        read_aspect_table(write(tmp_path / "a.csv", rows, header))
+        read_silhouette_table(write(tmp_path / "a.csv", rows, header))
 
 
 def test_unequal_steps_are_no_hole():
@@ -152,7 +154,7 @@ def test_unequal_steps_are_no_hole():
 
 
 def test_bad_direction_is_named(rows):
-    table = table_from_nodes(*np.array(rows).T)
+    table = silhouette_table_from_nodes(*np.array(rows).T)
     with pytest.raises(ValueError, match="elevation_rad is 2"):
         table.area(0.0, 2.0)
     with pytest.raises(ValueError, match="azimuth_rad is nan"):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.aircraft.aspect_tables import read_aspect_table, table_from_nodes
+from components.aircraft.aspect_tables import read_silhouette_table, silhouette_table_from_nodes
 from components.optical.silhouette import visible_area
 from components.thesis.scenes import aircraft
 from components.thesis.silhouette_comparison import main
@@ -106,7 +106,7 @@ def test_bodies_that_cannot_be_are_named(capsys):
 def test_at_a_pole_all_azimuths_are_one_direction():
     az, el = np.meshgrid(np.arange(0.0, 360.0, 90.0), [-90.0, 0.0, 90.0])
     area = np.array([[4.0, 4, 4, 4], [1, 2, 1, 2], [7, 8, 9, 12.0]])
-    table = table_from_nodes(az.ravel(), el.ravel(), area.ravel())
+    table = silhouette_table_from_nodes(az.ravel(), el.ravel(), area.ravel())
     seen = table.area(np.radians([0.0, 90.0, 179.0, -1e-9]), math.pi / 2)
     assert seen.tolist() == [9.0] * 4
     assert float(table.area(0.0, 0.0)) == 1.0 and float(table.area(0.0, -math.pi / 2)) == 4.0
@@ -132,4 +132,4 @@ def test_a_table_turned_by_90_degrees_is_spoken_of(turn_deg, warned, tmp_path, c
     arguments = ["--aircraft", str(craft), "--reference", str(table), "--step-deg", "90"]
     assert main([*arguments, "--models", "exact", "--out", str(tmp_path / "out")]) == 0
     assert ("looks turned by 90 degrees" in capsys.readouterr().err) == warned
-    assert read_aspect_table(table).area_m2.shape == (7, 12)
+    assert read_silhouette_table(table).area_m2.shape == (7, 12)

@@ -80,7 +80,7 @@ def test_finer_scan_lines_converge(synthetic_aircraft, directions):
 
 def test_table_of_a_mesh_through_the_silhouette_call(synthetic_aircraft):
     mesh = TriangleMesh(*synthetic_aircraft, rows=256)
-    table = mesh.tabulate(15.0)
+    table = mesh.build_silhouette_table(15.0)
     heading = np.radians([180.0, 90.0, 0.0, -90.0, 45.0, 180.0])
     elevation = np.radians([0.0, 0.0, 0.0, 0.0, 30.0, -90.0])
     by_mesh = visible_area(heading, 0.0, 0.0, elevation, model="convex_hull", mesh=mesh)
@@ -88,7 +88,7 @@ def test_table_of_a_mesh_through_the_silhouette_call(synthetic_aircraft):
     # All of these are nodes of the table; seen from either end of a line the scan lines differ.
     np.testing.assert_allclose(by_table, by_mesh, rtol=2e-2)
     with pytest.raises(ValueError, match=r"step_deg is 7\.0"):
-        mesh.tabulate(7.0)
+        mesh.build_silhouette_table(7.0)
 
 
 @pytest.mark.parametrize("suffix", ["stl", "obj"])

@@ -14,11 +14,11 @@ import components.optical.image as image
 from components.optical.flow import find_spot, spot_flow
 from components.optical.picture import (
     Pinhole,
+    capsule_and_plate_outlines,
     polygon_pixel_shares,
-    target_outlines,
     union_coverage,
 )
-from components.optical.silhouette import union_area
+from components.optical.silhouette import exact_area_of_bodies_union
 from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -107,8 +107,8 @@ def test_rendered_areas_are_those_of_the_silhouette():
     azimuth, elevation = rng.uniform(0.0, 6.2, n), rng.uniform(-1.0, 1.0, n)
     angles = rng.uniform(-3.0, 3.0, n), rng.uniform(-0.5, 0.5, n), rng.uniform(-1.2, 1.2, n)
     bodies = rng.uniform(1.0, 9.0, n), rng.uniform(6.0, 30.0, n), rng.uniform(8.0, 60.0, n)
-    outlines = target_outlines(azimuth, elevation, np.full(n, 1e5), angles, bodies)
-    want = union_area(angles[0] - azimuth, *angles[1:], elevation, *bodies, None)
+    outlines = capsule_and_plate_outlines(azimuth, elevation, np.full(n, 1e5), angles, bodies)
+    want = exact_area_of_bodies_union(angles[0] - azimuth, *angles[1:], elevation, *bodies, None)
     for i in range(n):
         line = np.array(
             [

@@ -64,12 +64,12 @@ def test_a_noisy_pair_flies_as_a_plain_loop_does():
     for name in ("exchange", "exchange_b"):
         exchange = simulation.nodes[name].component
 
-        def tapped(wake, keys, draw=exchange._fix_errors):
+        def tapped(wake, keys, draw=exchange._position_and_velocity_errors):
             both = [east + 1j * north for east, north in draw(wake, keys)]
             drawn.update(zip(wake.ticks.tolist(), zip(*both, strict=True), strict=True))
             return draw(wake, keys)
 
-        exchange._fix_errors = tapped
+        exchange._position_and_velocity_errors = tapped
     simulation.run()
     times_s = np.arange(float(len(drawn)))
     traffic, ours = simulation.nodes["traffic"].component, []

@@ -9,7 +9,7 @@ import dsa_des
 from components.cdti.scope import Scope
 from components.display.alerted import Alerted
 from components.display.outcomes import platform_by_block
-from components.display.picture_plane import held_positions
+from components.display.picture_plane import held_range_rows_and_positions
 from components.display.recorded_run import tables_of
 from components.display.symbols import platform_colours, recolour_by_platform, sensor_marks
 from components.view.run_picture import run_picture
@@ -88,7 +88,7 @@ def test_a_display_is_that_of_one_platform(scene):
     scopes = {on: Scope(simulation, on) for on in (None, "ownship", "b")}
     recorder.listeners += [scope.store_message for scope in scopes.values()]
     simulation.run()
-    shown = {on: scope.picture(8.0) for on, scope in scopes.items()}
+    shown = {on: scope.page_content(8.0) for on, scope in scopes.items()}
     assert shown[None] == shown["ownship"]
     assert [scopes[on].names for on in ("ownship", "b")] == [["b"], ["ownship"]]
     assert [one["name"] for one in scopes["b"].sensors] == ["radar_b"]
@@ -143,7 +143,7 @@ def test_tracks_go_out_to_other_programs_from_where_they_were_measured(own):
     tables["wires"] = [w for w in tables["wires"] if not any(name in str(w) for name in blocks)]
     run = tables_of(dsa_des.run(dsa_des.load_scene(tables)))
     assert run.own_name == "zulu" and next(iter(run.true_flights())) == "zulu"
-    rows, places = held_positions(run)
+    rows, places = held_range_rows_and_positions(run)
     about = np.array([run.texts("tracks", name) for name in ("block", "target")])[:, rows].T
     seen = {"tracker": {"bravo"}, "tracker_b": {"zulu"}, "tracker_s": {"zulu", "bravo"}}
     assert {(a, b) for a, b in about.tolist()} == {

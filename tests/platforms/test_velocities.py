@@ -10,7 +10,7 @@ from same_runs import replicas_of, same_as_alone, same_in_any_window, tables_of
 
 import dsa_des
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.running.nodes import find_demands
+from dsa_des.running.nodes import demands_of_clocks_downstream
 from dsa_des.running.simulation import Simulation
 
 SCENE = "configs/platforms/velocities.toml"
@@ -221,7 +221,7 @@ def test_who_is_heard_no_more_is_kept_in_mind_for_half_a_minute():
 def test_a_demand_that_comes_back_around_a_loop_asks_nothing_new():
     """Else each turn of the loop asked for rows one delay earlier, a thousand of them."""
     simulation = Simulation(scene())
-    demands = find_demands(simulation.nodes, "traffic")
+    demands = demands_of_clocks_downstream(simulation.nodes, "traffic")
     assert [(d.block, d.lead_ticks) for d in demands] == [
         ("exchange", 0),
         ("exchange_b", 0),

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from components.radar.beam import first_illumination
+from components.radar.beam import first_lit_time_and_mask
 from dsa_des.errors import BlockFailure
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
@@ -110,7 +110,7 @@ def test_who_comes_in_behind_the_beam_waits_for_the_next_scan() -> None:
     """A sweep of 2 rad in 1 s from 0: by hand."""
     start = np.array([-0.1, 0.5, 0.5, 2.1, 1.9, 2.0, 0.0, 4.0])
     rate = np.array([0.5, 0.0, 0.5, -0.5, 0.5, 0.0, -1.0, 0.0])
-    offset, lit = first_illumination(
+    offset, lit = first_lit_time_and_mask(
         lambda t: start + rate * t, start, start_rad=0.0, width_rad=2.0, scan_period_s=1.0
     )
     assert lit.tolist() == [False, True, True, True, False, True, True, False]
@@ -123,7 +123,7 @@ def test_a_passing_target_that_outruns_the_beam_for_a_while_is_still_found() -> 
     def azimuth_at(offset: np.ndarray) -> np.ndarray:
         return 1.0 + 0.6 * np.tanh((offset - 0.55) / 0.01)
 
-    offset, lit = first_illumination(
+    offset, lit = first_lit_time_and_mask(
         azimuth_at, azimuth_at(np.zeros(1)), start_rad=0.0, width_rad=2.0, scan_period_s=1.0
     )
     assert lit.all()

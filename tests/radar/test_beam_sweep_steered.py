@@ -188,7 +188,10 @@ def test_rows_keep_the_flights_they_know() -> None:
     def northward(own: Any, other: Any) -> Any:
         return {"north_deg": other.lat_deg - own.lat_deg, "of": {"target": other.lon_deg}}
 
-    halves = [joined.take_rows(rows).view_through(northward) for rows in (slice(0, 4), slice(4, 7))]
+    halves = [
+        joined.take_rows(rows).with_states_transformed(northward)
+        for rows in (slice(0, 4), slice(4, 7))
+    ]
     seen = KnownFlights.join_rows(halves)
     assert (seen(columns, time_s)["north_deg"] == time_s - north[:, np.newaxis]).all()
     row, ahead_s = np.array([5, 0, 6]), np.array([0.5, 0.25, 0.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from components.radar.detection import detection_probability
-from components.radar.detection.detector_output import false_alarm_snr, measured_snr
+from components.radar.detection.detector_output import false_alarm_snr, measured_snr_given_detection
 from components.radar.detection.threshold import detection_threshold
 
 DRAWS = (np.arange(100_000) + 0.5) / 100_000
@@ -26,7 +26,9 @@ def test_the_share_beyond_a_higher_threshold_is_the_pd_there_over_the_pd_here(mo
             share = pd(snr, pulses, pfa, model) / pd(snr, pulses, 1e-3, model)
             if share > 1.0 - 1e-9:
                 continue
-            found = measured_snr(share, snr, threshold=here, pulses=pulses, model=model)
+            found = measured_snr_given_detection(
+                share, snr, threshold=here, pulses=pulses, model=model
+            )
             there = float(detection_threshold(pulses, pfa))
             assert pulses * (found + 1.0) == pytest.approx(there, rel=2e-6), (snr, pfa)
 
@@ -47,14 +49,16 @@ def test_echoes_far_above_the_threshold_come_out_as_they_are_drawn(model, pulses
     }[model] * np.ones((1, pulses))
     noise = draws.normal(size=(2, count, pulses)) * np.sqrt(0.5)
     summed = ((np.sqrt(power) + noise[0]) ** 2 + noise[1] ** 2).sum(axis=1) / pulses - 1.0
-    found = measured_snr(draws.uniform(size=count), snr, threshold=0.0, pulses=pulses, model=model)
+    found = measured_snr_given_detection(
+        draws.uniform(size=count), snr, threshold=0.0, pulses=pulses, model=model
+    )
     assert ks_2samp(found, summed).pvalue > 1e-3
 
 
 def test_very_strong_steady_echoes_are_normal_in_amplitude():
     """On both sides of where the form changes, the spread of the power is that of its theory."""
     for snr in (4.9e4, 5.1e4, 1e9):
-        found = measured_snr(DRAWS[2::5], snr, threshold=10.0, model="swerling0")
+        found = measured_snr_given_detection(DRAWS[2::5], snr, threshold=10.0, model="swerling0")
         assert found.mean() == pytest.approx(snr, rel=1e-4)
         assert found.std() == pytest.approx(np.sqrt(2.0 * snr + 1.0), rel=1e-3)
 
@@ -65,7 +69,9 @@ def test_noise_is_an_echo_of_no_strength():
     for model in MODELS:
         np.testing.assert_array_equal(
             false_alarm_snr(DRAWS, **settings),
-            measured_snr(1.0 - DRAWS, 0.0, threshold=threshold, pulses=4, model=model),
+            measured_snr_given_detection(
+                1.0 - DRAWS, 0.0, threshold=threshold, pulses=4, model=model
+            ),
         )
     for wrong, said in (
         ({"snr": -1.0}, "snr is -1: it must be 0 or more"),
@@ -75,4 +81,4 @@ def test_noise_is_an_echo_of_no_strength():
     ):
         values = {"tail": 0.5, "snr": 1.0, "threshold": 3.0, **wrong}
         with pytest.raises(ValueError, match=said):
-            measured_snr(**values)
+            measured_snr_given_detection(**values)

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.figure import Figure
 
 import dsa_des
-from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_files
+from dsa_des.files.output_folder import RUN_JSON, OutputFolder, foreign_or_changed_files
 from dsa_des.record.drawing import _shorten_and_escape_texts
 from dsa_des.record.run_folder import _matching_rows, read_run, write_json, write_run_json
 
@@ -80,17 +80,17 @@ def test_what_a_run_wrote_is_its_own_and_nothing_else(tmp_path):
     (tmp_path / "figures").mkdir()
     (tmp_path / "figures" / "one.png").write_bytes(b"PNG")
     fill(tmp_path)
-    assert foreign_files(tmp_path) == []
+    assert foreign_or_changed_files(tmp_path) == []
     (tmp_path / "notes.txt").write_text("mine")
     (tmp_path / "empty").mkdir()
     (tmp_path / "figures" / "two.png").symlink_to("one.png")
-    assert foreign_files(tmp_path) == ["empty", "figures/two.png", "notes.txt"]
+    assert foreign_or_changed_files(tmp_path) == ["empty", "figures/two.png", "notes.txt"]
 
 
 def test_a_file_that_was_changed_since_is_no_longer_the_run_s(tmp_path):
     fill(tmp_path)
     (tmp_path / "scene.toml").write_text("seed = 2\n", encoding="utf-8")  # of the same length
-    assert foreign_files(tmp_path) == ["scene.toml"]
+    assert foreign_or_changed_files(tmp_path) == ["scene.toml"]
 
 
 @pytest.mark.parametrize(
@@ -99,7 +99,7 @@ def test_a_file_that_was_changed_since_is_no_longer_the_run_s(tmp_path):
 def test_a_run_json_of_somebody_else_makes_nothing_ours(text, tmp_path):
     (tmp_path / RUN_JSON).write_text(text)
     (tmp_path / "scans.parquet").write_bytes(b"")
-    assert foreign_files(tmp_path) == [RUN_JSON, "scans.parquet"]
+    assert foreign_or_changed_files(tmp_path) == [RUN_JSON, "scans.parquet"]
 
 
 def test_a_link_named_run_json_makes_nothing_ours(tmp_path):
@@ -108,7 +108,7 @@ def test_a_link_named_run_json_makes_nothing_ours(tmp_path):
     other = tmp_path / "other"
     other.mkdir()
     (other / RUN_JSON).symlink_to(tmp_path / "run" / RUN_JSON)
-    assert foreign_files(other) == [RUN_JSON]
+    assert foreign_or_changed_files(other) == [RUN_JSON]
 
 
 @pytest.mark.parametrize("is_dictionary", [False, True])

@@ -12,13 +12,13 @@ from same_runs import replicas_of
 from wired import SEES_ALL, chain
 
 import dsa_des
-from components.fusion.pick_best import closest_clock_distance_s
+from components.fusion.pick_best import least_tick_distance_s
 from components.guidance.mvp import VoltagePotential
 from components.messages.reach import FarthestLook
 from components.surveillance.exchange import PositionExchange
-from dsa_des.arrays.run_ticks import single_run_numbers
+from dsa_des.arrays.run_ticks import shared_zero_run_numbers
 from dsa_des.block.entry_points import entry_points_of
-from dsa_des.record.failure_counts import Tries, add_counts
+from dsa_des.record.failure_counts import Tries, sum_failure_counts
 from dsa_des.replicas.lockstep import make_lockstep_simulation
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation
@@ -110,7 +110,7 @@ def test_a_fusion_whose_sensors_never_meet_is_counted_by_runs(fusion: str) -> No
     )
     once = {"blocks.eye.offset_s": 0}
     together = replicas_of(dsa_des.load_scene(found), {}, once, {})
-    assert make_lockstep_simulation(together).run().failure_counts == add_counts(
+    assert make_lockstep_simulation(together).run().failure_counts == sum_failure_counts(
         map(failure_counts, together)
     )
     assert failure_counts(together[1])["fusion"] == {NOT_TOGETHER: (0, 1)}
@@ -132,7 +132,7 @@ def test_how_near_two_clocks_come_is_found_among_their_instants(
     first, second = ([Fraction(x) for x in clock] for clock in (one, other))
     instants = [[clock[0] + k * clock[1] for k in range(60)] for clock in (first, second)]
     by_hand = min(abs(a - b) for a in instants[0] for b in instants[1])
-    assert closest_clock_distance_s(tuple(first), tuple(second)) == by_hand == Fraction(apart_s)
+    assert least_tick_distance_s(tuple(first), tuple(second)) == by_hand == Fraction(apart_s)
 
 
 def test_trackers_whose_tracks_are_of_others_are_counted() -> None:
@@ -228,7 +228,7 @@ def test_a_tracker_that_never_has_a_track_is_counted(tracker: str, what: str) ->
                  tracker={"type": tracker})  # fmt: skip
     assert failure_counts(seen)["tracker"][what] == (0, 1)
     runs = replicas_of(dsa_des.load_scene(found), {}, {})
-    assert make_lockstep_simulation(runs).run().failure_counts == add_counts(
+    assert make_lockstep_simulation(runs).run().failure_counts == sum_failure_counts(
         map(failure_counts, runs)
     )
 
@@ -311,7 +311,9 @@ def test_tries_of_runs_add_up_whatever_comes_when() -> None:
     ]
     assert tries.failure_counts("x")["x"].tolist() == [[1, 0, 1, 0, 0], [1, 0, 1, 0, 1]]
     assert Tries().failure_counts("x")["x"].shape == (2, 0)
-    alone = Tries().add_tries(single_run_numbers(1), np.array([1]), np.array([True]))
+    alone = Tries().add_tries(shared_zero_run_numbers(1), np.array([1]), np.array([True]))
     for _ in range(2):  # a second source comes later, and it is done no more
-        alone = alone.add_tries(single_run_numbers(2), np.array([1, 2]), np.zeros(2, dtype=bool))
+        alone = alone.add_tries(
+            shared_zero_run_numbers(2), np.array([1, 2]), np.zeros(2, dtype=bool)
+        )
     assert alone.failure_counts("x", of_two=True)["x"].tolist() == [[0], [1]]

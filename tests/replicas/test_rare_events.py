@@ -15,7 +15,12 @@ from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
 from dsa_des.replicas.changed_scene import Replica
-from dsa_des.replicas.splitting import FlownRuns, find_levels, resample_parents, run_repetitions
+from dsa_des.replicas.splitting import (
+    FlownRuns,
+    find_levels,
+    parent_indices_of_branches,
+    run_repetitions,
+)
 from dsa_des.results.statistics import estimate_rare_probability
 from dsa_des.studies.chunk import run_chunk
 from dsa_des.studies.study_file import read_study
@@ -172,7 +177,7 @@ def test_branches_come_from_each_run_as_often_as_it_weighs():
     weights = np.array([1.0, 2.0, 5.0, 2.0])
     often = np.zeros(4)
     for k in range(1000):
-        chosen = np.bincount(resample_parents(weights, 7, (k + 0.5) / 1000), minlength=4)
+        chosen = np.bincount(parent_indices_of_branches(weights, 7, (k + 0.5) / 1000), minlength=4)
         assert (np.abs(chosen - 0.7 * weights) < 1.0).all()
         often += chosen
     np.testing.assert_allclose(often / 1000, 0.7 * weights, rtol=2e-3)

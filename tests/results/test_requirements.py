@@ -112,8 +112,10 @@ def test_what_is_wrong_is_said(old: str, new: str, said: str, tmp_path: Path) ->
 def test_a_study_draws_its_map_and_tells_the_cheapest(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn, draw = [], figures.draw_map
-    monkeypatch.setattr(figures, "draw_map", lambda *given: drawn.append(given) or draw(*given))
+    drawn, draw = [], figures.draw_contour_map
+    monkeypatch.setattr(
+        figures, "draw_contour_map", lambda *given: drawn.append(given) or draw(*given)
+    )
     text = STUDY.replace("SCENE", str(ROOT / "configs" / "first_light.toml"))
     across, up = "blocks.eo.scan_rate_hz", "blocks.radar.scan_rate_hz"
     text = text.replace('kind = "map"\n', f'kind = "map"\nx = "{across}"\ny = "{up}"\n')

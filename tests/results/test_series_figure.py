@@ -10,16 +10,16 @@ from scipy.stats import chi2
 
 from dsa_des.cli import main
 from dsa_des.results import curves
-from dsa_des.results.curves import draw_series
+from dsa_des.results.curves import draw_numbered_results
 from dsa_des.results.record import NUMBER, Result
 from dsa_des.results.statistics import Estimate
-from dsa_des.results.summary import Line, result_numbers_of_series
+from dsa_des.results.summary import Line, numbers_by_series_result
 from dsa_des.results.tables import Tables
 
 
 def test_a_series_is_what_bears_a_number_in_its_order():
     names = ["a.t.10", "a.t.9", "a.t.x", "b.t.1", "a.t", "a.tt.3"]
-    assert list(result_numbers_of_series("a.t", names).items()) == [
+    assert list(numbers_by_series_result("a.t", names).items()) == [
         ("a.t.9", 9.0),
         ("a.t.10", 10.0),
     ]
@@ -51,7 +51,7 @@ def test_it_is_drawn_to_the_same_bytes(tmp_path: Path):
     drawn = []
     for name in ("a.png", "b.png"):
         place = tmp_path / name
-        draw_series(place, [("", [1.0, 2.0], lines)], "nees.time_s", "T", 0.95, 6.0)
+        draw_numbered_results(place, [("", [1.0, 2.0], lines)], "nees.time_s", "T", 0.95, 6.0)
         drawn.append(place.read_bytes())
     assert drawn[0] == drawn[1] and drawn[0].startswith(b"\x89PNG")
 

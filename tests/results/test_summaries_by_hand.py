@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from dsa_des.commands.what_changed import ConditionPair, print_changes
-from dsa_des.costs.replay import median_and_spread
+from dsa_des.costs.replay import median_and_half_iqr
 from dsa_des.results.differences import _agresti_caffo_difference, estimate_difference
 from dsa_des.results.record import NUMBER, SHARE, TRIALS, Result
 from dsa_des.results.statistics import estimate_rare_probability
@@ -102,10 +102,10 @@ def test_what_differs_by_rounding_only_has_not_changed(capsys):
 
 def test_medians_and_half_the_quartiles_distance() -> None:
     """Of 1, 2, 4, 8 and 16 the quartiles are 2 and 8; of 1 and 3 they are 1.5 and 2.5."""
-    assert median_and_spread([16.0, 1.0, 8.0, 2.0, 4.0]) == (4.0, 3.0)
-    assert median_and_spread([3.0, 1.0]) == (2.0, 0.5)
-    assert median_and_spread([7.0]) == (7.0, 0.0)
-    assert np.isnan(median_and_spread([])).all()
+    assert median_and_half_iqr([16.0, 1.0, 8.0, 2.0, 4.0]) == (4.0, 3.0)
+    assert median_and_half_iqr([3.0, 1.0]) == (2.0, 0.5)
+    assert median_and_half_iqr([7.0]) == (7.0, 0.0)
+    assert np.isnan(median_and_half_iqr([])).all()
 
 
 def test_the_mean_of_rare_probabilities_by_hand() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from components.messages.contributors import combination_text, mask_type
+from components.messages.contributors import joined_sensor_names_of_masks, mask_dtype_for_sensors
 from dsa_des.block.message import Text
 
 HEAD = """
@@ -59,13 +59,13 @@ def test_every_sensor_in_reach_is_named(lab, fusion, number):
 def test_masks_become_names(sensors):
     names = tuple(f"s{i}" for i in range(sensors))
     last = 1 << (sensors - 1)
-    masks = np.array([last, 1, last | 1, 1], dtype=mask_type(sensors))
-    text = combination_text(masks, names)
+    masks = np.array([last, 1, last | 1, 1], dtype=mask_dtype_for_sensors(sensors))
+    text = joined_sensor_names_of_masks(masks, names)
     both = names[0] if sensors == 1 else f"{names[0]}+{names[-1]}"
     assert [text.names[code] for code in text.codes] == [names[-1], names[0], both, names[0]]
     ascending = [sum(1 << names.index(n) for n in name.split("+")) for name in text.names]
     assert ascending == sorted(ascending)  # what files hold does not depend on how it is counted
-    none = combination_text(np.empty(0, dtype=mask_type(sensors)), names)
+    none = joined_sensor_names_of_masks(np.empty(0, dtype=mask_dtype_for_sensors(sensors)), names)
     assert isinstance(none, Text) and len(none) == 0
 
 

@@ -186,8 +186,8 @@ def test_who_it_is_decides_no_declaration_by_place():
              if row["block"] == "radar" and row["target"] is None]  # fmt: skip
     assert {*noise} == {True, False}
     by_name = dsa_des.load_scene(chain(sensors), sets=["blocks.told.declare_by=target"])
-    assert by_name.blocks["told"].parameters.declares_by == "target"
-    assert by_name.blocks["laser"].parameters.declares_by == "place"
+    assert by_name.blocks["told"].parameters.declares_by_target_or_place == "target"
+    assert by_name.blocks["laser"].parameters.declares_by_target_or_place == "place"
 
 
 def declared(duration_s=4, kind="radar.range_boundary", **keys):

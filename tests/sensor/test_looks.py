@@ -124,7 +124,7 @@ def test_a_value_of_neither_kind_is_one_problem():
     ],
 )
 def test_what_declares_says_why(m, by, asked, place, target):
-    p = SimpleNamespace(declare_m=m, declare_n=3, declares_by=by, declare_by=asked)
+    p = SimpleNamespace(declare_m=m, declare_n=3, declares_by_target_or_place=by, declare_by=asked)
     for effect, wanted, applies in (
         (DeclarationByPlace, place, m is not None and by == "place"),
         (DeclarationRule, target or place, m is not None and by == "target"),

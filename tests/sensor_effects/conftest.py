@@ -99,9 +99,10 @@ class Runs:
         memory = MemorySink()
         simulation = Simulation(load_scene(path), recorder=Recorder([memory]), **options)
         outcome = simulation.run()
-        notes = metadata_of_run(simulation.recorded_messages(), "", 1, simulation.ticks_per_s)
+        notes = metadata_of_run(simulation.recorded_message_types(), "", 1, simulation.ticks_per_s)
         return Made(
-            tables=notes.attach(memory.tables()), plan=simulation.plan, simulation=simulation,
+            tables=notes.tables_with_metadata(memory.tables()), plan=simulation.plan,
+            simulation=simulation,
             outcome=outcome,
         )  # fmt: skip
 

@@ -14,7 +14,7 @@ from wired import HEARS_ALL, SEES_ALL, SENSORS, chain, rows, run, sensor
 
 import dsa_des
 from components.atmosphere.attenuation import rain_coefficients
-from components.environment.weather_cells import path_share_in_disc
+from components.environment.weather_cells import disc_entry_and_exit_shares
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation
 
@@ -217,7 +217,7 @@ def test_cells_that_change_and_move_give_the_same_bytes_in_any_window_and_beside
 
 def test_a_path_straight_up_lies_in_a_circle_or_not():
     none = np.zeros(2)
-    within = path_share_in_disc(none, none, np.array([50.0, 150.0]), none, 100.0)
+    within = disc_entry_and_exit_shares(none, none, np.array([50.0, 150.0]), none, 100.0)
     assert [each.tolist() for each in within] == [[0.0, 0.0], [1.0, 0.0]]
 
 

@@ -14,7 +14,7 @@ from wired import HEARS_ALL, chain, rows, run
 
 from components.estimation.frame import pose_in_frame
 from components.export import stone_soup
-from components.stone_soup.objects import euler_angles_rad
+from components.stone_soup.objects import roll_pitch_yaw_rad
 from dsa_des.errors import UsageError
 
 START = datetime(2000, 1, 1)
@@ -120,7 +120,7 @@ def test_angles_stand_for_the_same_rotation(pitch_deg):
     origin, here = (-41.0, 179.8, 0.0), (-41.3, -179.9997, 2400.0)
     columns = [np.array([v]) for v in (*origin, *here, *np.radians([222.0, pitch_deg, -27.0]))]
     place = pose_in_frame(tuple(columns[:3]), tuple(columns[3:6]), tuple(columns[6:]))
-    got = build_rotation_matrix(euler_angles_rad(place.to_body))
+    got = build_rotation_matrix(roll_pitch_yaw_rad(place.to_body))
     to_ned = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
     known = np.diag([1, -1, -1]) @ place.to_body[:, :, 0] @ to_ned
     np.testing.assert_allclose(got, known, atol=2e-9)

@@ -178,7 +178,7 @@ def test_jitter_does_not_move_a_scan_over_the_border_of_its_stretch():
         expected[21:41] += moved
         expected[21], expected[40] = max(expected[21], 10_450), min(expected[40], 20_049)
         assert clock.ticks(np.arange(60)).tolist() == expected.tolist()
-        assert clock.between(10_450, 20_050)[0].tolist() == list(range(21, 41))
+        assert clock.scans_between(10_450, 20_050)[0].tolist() == list(range(21, 41))
 
 
 def test_what_is_remembered_goes_on_in_any_window_and_beside_other_runs():

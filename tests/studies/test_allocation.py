@@ -81,7 +81,7 @@ def allocated(
         stands_for[start:end] = sample_runs_to_fly(
             plan.probabilities(here), rng.uniform(size=end - start)
         )[1]
-        predicted[start:end] = plan.predictions(here)[0]
+        predicted[start:end] = plan.predicted_event_chances(here)[0]
         start = end
     return stands_for, predicted
 
@@ -318,9 +318,9 @@ def test_an_event_that_was_seen_often_is_predicted_and_the_sure_are_flown_less()
         learn_allocation(runs, happened, few),
         learn_allocation(runs, happened, np.ones(2000)),
     )
-    assert not unsure.predictions(runs).any()
+    assert not unsure.predicted_event_chances(runs).any()
     truth = np.where(runs.geometry[1] > 0.6, 0.7, 0.35)[runs.nominal[0] > 0.0]
-    found = sure.predictions(runs)[0][runs.nominal[0] > 0.0]
+    found = sure.predicted_event_chances(runs)[0][runs.nominal[0] > 0.0]
     assert np.abs(found - truth).mean() < 0.1
     both = np.array([[0.5, 0.9], [0.5, 0.9]])
     open_ = sampling_variance(both, np.array([True, False]))

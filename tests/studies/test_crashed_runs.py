@@ -15,7 +15,7 @@ from dsa_des.results.folder import StudyFolder, failure_counts_of_part
 from dsa_des.results.record import CRASHED, DONE
 from dsa_des.studies import executors
 from dsa_des.studies.attempts import TRIES, Attempts, split_chunk
-from dsa_des.studies.chunk import ChunkResult, join_pieces, make_chunk_result
+from dsa_des.studies.chunk import ChunkResult, join_chunk_results, make_chunk_result
 from dsa_des.studies.executors import Local
 from dsa_des.studies.runner import run_study
 from dsa_des.studies.study import Chunk
@@ -134,7 +134,9 @@ class _Process:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         module = "dsa_des.studies.attempts"
-        monkeypatch.setattr(f"{module}.join_pieces", lambda name, parts: self.sum(name, parts))
+        monkeypatch.setattr(
+            f"{module}.join_chunk_results", lambda name, parts: self.sum(name, parts)
+        )
         monkeypatch.setattr(
             f"{module}.crashed_chunk_result",
             lambda study, chunk, tries: ChunkResult(chunk.name, b"", 1, 1, 1),
@@ -153,7 +155,7 @@ class _Process:
                 self.deaths += piece.chunks
                 found += attempts.retry_after_crash(piece)
             else:
-                found += attempts.take_results(
+                found += attempts.accept_results_return_complete(
                     piece, [ChunkResult(chunk.name, b"", len(chunk), 0) for chunk in piece.chunks]
                 )
         return found
@@ -186,7 +188,7 @@ def test_a_last_try_is_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     assert first is not None and second is not None
     attempts.retry_after_crash(first)
     assert attempts.next_piece() is None  # the other one is still under way
-    attempts.take_results(second, [ChunkResult("b", b"", 1, 0)])
+    attempts.accept_results_return_complete(second, [ChunkResult("b", b"", 1, 0)])
     again = attempts.next_piece()
     assert again is not None and again.chunks[0].name == "a" and attempts.next_piece() is None
 
@@ -218,7 +220,7 @@ def test_a_part_says_what_its_runs_are_and_what_blocks_could_not_do() -> None:
         0,
         {},
     )
-    whole = join_pieces("whole", [silent, replace(first, cpu_s=2.5), first])
+    whole = join_chunk_results("whole", [silent, replace(first, cpu_s=2.5), first])
     table = pq.read_table(pa.BufferReader(whole.content))
     assert table["cell"].to_pylist() == [0, 0, 1, 1, 2, 2, 3, 3, 4]
     assert (whole.name, whole.runs, whole.failed, whole.crashed) == ("whole", 9, 4, 2)

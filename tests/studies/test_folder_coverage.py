@@ -12,7 +12,7 @@ import pytest
 
 from dsa_des.results.summary import compare_axis, summarise
 from dsa_des.studies import study as study_module
-from dsa_des.studies.study_digest import results_of
+from dsa_des.studies.study_digest import result_columns_of_study
 from dsa_des.studies.study_file import read_study
 from tests.results.conftest import rows_of_table
 from tests.support.encounter_folder import rows_of, write_encounter, write_scene
@@ -86,7 +86,7 @@ def held(folder: Path, rounds: int) -> dict[str, float]:
             write_encounter(folder / "encounters" / f"{file:02d}.xyz", north_m)
         if number == 0:
             read = read_study(folder / "study.toml")
-            results = results_of(read)
+            results = result_columns_of_study(read)
         rows = rows_of_table(
             rows_of(dataclasses.replace(read, seed=number)),
             [axis.column for axis in read.axes],

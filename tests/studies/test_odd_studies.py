@@ -109,8 +109,8 @@ def test_what_json_cannot_hold_is_text_there(small: Path) -> None:
 
 
 def test_a_choice_of_lists_is_a_text(small: Path) -> None:
-    assert not parse_draw("x", {"choice": [[1, 2], [3]]}).numeric
-    assert parse_draw("x", {"choice": [1, 2.5, True]}).numeric
+    assert not parse_draw("x", {"choice": [[1, 2], [3]]}).is_numeric
+    assert parse_draw("x", {"choice": [1, 2.5, True]}).is_numeric
 
 
 def test_compare_with_bad_input_is_2(small: Path) -> None:
@@ -146,12 +146,14 @@ def test_cells_are_counted_like_a_product() -> None:
     study = object.__new__(Study)
     study.axes = axes
     every = list(itertools.product(range(2), range(3), range(1), range(4)))
-    assert [study.indices(cell) for cell in study.cells] == every and len(study.cells) == 24
+    assert [study.axis_value_indices(cell) for cell in study.cells] == every and len(
+        study.cells
+    ) == 24
     assert [study.cell_at(indices) for indices in every] == list(range(24))
     with pytest.raises(ValueError, match="24"):
-        study.indices(24)
+        study.axis_value_indices(24)
     study.axes = ()
-    assert list(study.cells) == [0] and study.indices(0) == () and study.cell_at(()) == 0
+    assert list(study.cells) == [0] and study.axis_value_indices(0) == () and study.cell_at(()) == 0
 
 
 @pytest.mark.parametrize("value", ["what?", "a*b", "[c]"])

@@ -11,7 +11,7 @@ from dsa_des.errors import SceneError
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.replicas.changed_scene import Replica, replica_scene
-from dsa_des.replicas.replicas import Failed, Recorded, lock_step_refusal, run_replicas
+from dsa_des.replicas.replicas import Failed, Recorded, reason_against_lock_step, run_replicas
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene, load_scene
 
@@ -95,7 +95,7 @@ def test_a_wrong_change_fails_its_own_replica(
 def test_drawn_targets_run_one_by_one_and_it_is_said(small: Path) -> None:
     base = load_scene("small.toml")
     seen = [Replica(k, {"blocks.traffic.intruders[0].contrast": float(k)}) for k in (1, 2)]
-    assert "what block traffic tells its neighbours" in (lock_step_refusal(base, seen) or "")
+    assert "what block traffic tells its neighbours" in (reason_against_lock_step(base, seen) or "")
     for key in ("rcs_dbsm", "east_m"):
         where = [Replica(k, {f"blocks.traffic.intruders[0].{key}": float(k)}) for k in (1, 2)]
-        assert lock_step_refusal(base, where) is None
+        assert reason_against_lock_step(base, where) is None

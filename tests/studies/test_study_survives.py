@@ -11,7 +11,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from dsa_des.commands.study import report_finished_study, run_study_into_folder
+from dsa_des.commands.study import run_study_into_folder, write_and_print_finished_study
 from dsa_des.errors import UsageError
 from dsa_des.results.folder import NotWritten, StudyFolder
 from dsa_des.results.statistics import wilson_interval
@@ -42,7 +42,9 @@ def contents(folder: Path) -> dict[str, bytes]:
 def undisturbed(name: str = "alone", repeat: str = "") -> dict[str, bytes]:
     study = read_study("study.toml")
     study.repeat = repeat
-    report_finished_study(study, run_study_into_folder(study, Path(name), 1, False), quiet=True)
+    write_and_print_finished_study(
+        study, run_study_into_folder(study, Path(name), 1, False), quiet=True
+    )
     return contents(Path(name))
 
 
@@ -99,7 +101,9 @@ def test_a_killed_worker_changes_nothing(small: Path) -> None:
     whole = undisturbed()
     flag.unlink()
     study = read_study("study.toml")
-    report_finished_study(study, run_study_into_folder(study, Path("pool"), 2, False), quiet=True)
+    write_and_print_finished_study(
+        study, run_study_into_folder(study, Path("pool"), 2, False), quiet=True
+    )
     assert flag.exists()
     assert contents(Path("pool")) == whole
 
@@ -140,7 +144,9 @@ def test_a_full_disk_leaves_a_resumable_folder(small: Path) -> None:
     done = sorted(path.name for path in Path("full/parts").iterdir())
     assert all(name.endswith(".parquet") and not name.startswith(".") for name in done)
     study = read_study("study.toml")
-    report_finished_study(study, run_study_into_folder(study, Path("full"), 1, True), quiet=True)
+    write_and_print_finished_study(
+        study, run_study_into_folder(study, Path("full"), 1, True), quiet=True
+    )
     assert contents(Path("full")) == whole
     assert resource.getrlimit(resource.RLIMIT_FSIZE)[0] != limit
 
@@ -158,7 +164,9 @@ def test_ctrl_c_leaves_a_resumable_folder(released: Path) -> None:
     assert "continue with" in stderr and "Traceback" not in stderr
     released.touch()
     study = read_study("study.toml")
-    report_finished_study(study, run_study_into_folder(study, Path("stopped"), 1, True), quiet=True)
+    write_and_print_finished_study(
+        study, run_study_into_folder(study, Path("stopped"), 1, True), quiet=True
+    )
     assert contents(Path("stopped")) == whole
 
 
@@ -166,7 +174,9 @@ def test_a_part_that_cannot_be_read_is_run_again(small: Path) -> None:
     whole = undisturbed()
     (Path("alone/parts") / "part-000-000002.parquet").write_bytes(b"torn")
     study = read_study("study.toml")
-    report_finished_study(study, run_study_into_folder(study, Path("alone"), 1, True), quiet=True)
+    write_and_print_finished_study(
+        study, run_study_into_folder(study, Path("alone"), 1, True), quiet=True
+    )
     assert contents(Path("alone")) == whole
 
 
@@ -204,7 +214,7 @@ def test_a_dask_cluster_gives_the_same_bytes_also_when_a_worker_dies(small: Path
         if old is not None:
             os.environ["PYTHONPATH"] = old
     assert flag.exists()
-    report_finished_study(study, folder, quiet=True)
+    write_and_print_finished_study(study, folder, quiet=True)
     assert contents(Path("dask")) == whole
 
 

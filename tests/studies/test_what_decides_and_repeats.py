@@ -49,7 +49,7 @@ class _Folder:
 def test_a_ratio_ends_a_study_by_its_weighted_interval(monkeypatch: pytest.MonkeyPatch) -> None:
     """At the study's own confidence, over the rounds before."""
     folder = _Folder()
-    monkeypatch.setattr(runner, "results_of", lambda study: [ratio("r", weight="w")])
+    monkeypatch.setattr(runner, "result_columns_of_study", lambda study: [ratio("r", weight="w")])
     for confidence in (0.5, 0.95):
         by_hand = paired_ratio(folder.n[:60], folder.m[:60], folder.w[:60], confidence=confidence)
         half = 0.5 * (by_hand.interval[1] - by_hand.interval[0])

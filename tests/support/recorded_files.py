@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.recorded.known_kinds import record
+from components.formats.recorded.known_kinds import recording_of_file
 from components.formats.text_rows import TrafficFileError
 
 Fix = tuple[float, float, float, float]
@@ -200,7 +200,7 @@ def assert_refused_or_whole(path: Path, whole: bytes) -> None:
                 raw = raw[: max(at, 1)]
         path.write_bytes(bytes(raw))
         try:
-            file = record(path).flights()
+            file = recording_of_file(path).flights()
         except TrafficFileError as error:
             assert 1 <= len(error.problems) <= 20
             continue

@@ -9,15 +9,15 @@ import pytest
 
 from components.surveillance.compact_position import (
     decode_near,
-    decode_pair,
+    decode_newer_of_pair,
     encode,
     number_of_longitude_zones,
 )
 from components.surveillance.extended_squitter import (
     is_intact,
+    north_east_climb_nacv,
     position_fields,
     position_messages,
-    velocity_fields,
     velocity_messages,
 )
 
@@ -38,7 +38,7 @@ def test_the_worked_example_of_a_position():
     assert found.altitude_ft.tolist() == [38000.0, 38000.0] and found.odd.tolist() == [False, True]
     assert found.y.tolist() == [93000, 74158] and found.x.tolist() == [51372, 50194]
     y, x = found.y[:, np.newaxis], found.x[:, np.newaxis]
-    lat, lon = decode_pair((y[0], x[0]), (y[1], x[1]), False)
+    lat, lon = decode_newer_of_pair((y[0], x[0]), (y[1], x[1]), False)
     assert lat[0] == pytest.approx(52.2572021484375, abs=1e-12)
     assert lon[0] == pytest.approx(3.91937255859375, abs=1e-12)
     near = decode_near(y[0], x[0], np.array([False]), 52.258, 3.918)
@@ -48,7 +48,7 @@ def test_the_worked_example_of_a_position():
 
 
 def test_the_worked_example_of_a_velocity():
-    north, east, climb, nacv = velocity_fields(bytes_of(VELOCITY))
+    north, east, climb, nacv = north_east_climb_nacv(bytes_of(VELOCITY))
     assert np.hypot(north[0], east[0]) == pytest.approx(159.20, abs=0.005)
     assert np.degrees(np.arctan2(east[0], north[0])) % 360 == pytest.approx(182.88, abs=0.005)
     assert (climb[0], nacv[0]) == (-832.0, 0)
@@ -101,7 +101,7 @@ def test_pairs_decode_anywhere_or_say_that_they_do_not():
     lat, lon = places()
     even, odd = encode(lat, lon, False), encode(lat, lon, True)
     for newer in (False, True):
-        found = decode_pair(even, odd, newer)
+        found = decode_newer_of_pair(even, odd, newer)
         known = np.isfinite(found[0])
         assert known[:2000].mean() > 0.99
         assert np.abs(found[0] - lat)[known].max() < 3e-5
@@ -113,7 +113,7 @@ def test_velocities_decode_to_whole_knots():
     rng = np.random.default_rng(4)
     north, east = rng.uniform(-1021, 1021, (2, 500))
     climb = rng.uniform(-32000, 32000, 500)
-    found = velocity_fields(velocity_messages(1, north, east, climb, 3))
+    found = north_east_climb_nacv(velocity_messages(1, north, east, climb, 3))
     assert np.abs(found[0] - north).max() <= 0.5 and np.abs(found[1] - east).max() <= 0.5
     assert np.abs(found[2] - climb).max() <= 32.0 and set(found[3].tolist()) == {3}
 

@@ -14,7 +14,7 @@ from components.surveillance.altimetry import (
     SHARE_OF_BETTER,
     altimetry_error_ft,
     altimetry_variance_ft2,
-    standard_laplace,
+    laplace_draws_from_uniform,
 )
 from components.surveillance.broadcast import CORRELATION_TIME_S, Broadcasts, Transponders
 from components.surveillance.reception import (
@@ -74,7 +74,7 @@ def test_altimetry_errors_are_laplacian_by_layer(layer):
     low = [0.0, *LAYER_TOPS_FT][layer]
     altitude = np.full(N, low + 100.0)
     uniform, kind = np.random.default_rng(layer).random((2, N))
-    error = altimetry_error_ft(altitude, standard_laplace(uniform), kind)
+    error = altimetry_error_ft(altitude, laplace_draws_from_uniform(uniform), kind)
     share, better, other = SHARE_OF_BETTER[layer], BETTER_FT[layer], OTHER_FT[layer]
     # Moments of a Laplace distribution: E|x| = b, E x² = 2 b², E x⁴ = 24 b⁴.
     first = share * better + (1.0 - share) * other

@@ -316,7 +316,7 @@ def test_a_receiver_offers_that_positions_are_late_where_one_aircraft_s_may_be(l
     made = Simulation(dsa_des.load_scene(chain({"sensor": one}, targets=targets)))
     offer = made.components["sensor"].offer("detections")
     assert (LATE in offer.told_errors) is is_offered
-    assert made.components["sensor"].steps["range_rate"] == 0.0
+    assert made.components["sensor"].grid_step_by_quantity["range_rate"] == 0.0
     variances = offer.azimuth_variance_rad2, offer.elevation_variance_rad2
     assert (*variances, offer.range_variance_m2, offer.range_rate_variance_m2_s2) == (None,) * 4
     assert offer.unstated_across_m2 == 0.0 and offer.tells

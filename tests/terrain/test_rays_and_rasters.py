@@ -11,14 +11,18 @@ from scipy.ndimage import map_coordinates
 from wired import chain
 
 import dsa_des
-from components.flights.bounds import _position_bounds, check_above_terrain, check_on_raster
+from components.flights.bounds import (
+    _latitude_and_altitude_bounds,
+    check_above_raster_ground,
+    check_above_terrain,
+)
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
     geodetic_lat_rad_lon_deg,
     horizon_dip_rad,
     is_behind_limb,
     is_behind_terrain,
-    max_undetected_ground_m,
+    max_ground_above_clear_ray_m,
     rays_between,
     refracted_elevation_rad,
 )
@@ -165,7 +169,7 @@ def test_rays_through_mountains_by_brute_force(refraction):
     # Never hidden where nothing stands in it (the brute force's comb misses crests by metres);
     # missed only by less than the bound.
     assert (above[found] > -15.0).all()
-    assert (above[~found] < max_undetected_ground_m(raster)).all()
+    assert (above[~found] < max_ground_above_clear_ray_m(raster)).all()
     # The raster's zero counts, and one by one they are what they are together.
     assert is_behind_terrain(*ends, raster, offset_m=2000.0).all()
     single = [
@@ -227,7 +231,7 @@ def test_a_plain_hides_what_a_sea_of_its_height_hides(refraction):
     lift = 500.0 + sag + rng.uniform(-6.0, 6.0, 500) + tilt**2 / (4.0 * sag)
     ends = (*own, lift - tilt), (*other, lift + tilt)
     low = rays_between(*ends, refraction).lowest_height_m()
-    known = np.abs(low - 500.0) > max_undetected_ground_m(plain) + 0.001
+    known = np.abs(low - 500.0) > max_ground_above_clear_ray_m(plain) + 0.001
     hidden = is_behind_terrain(*ends, plain, refraction=refraction)
     assert (hidden == is_behind_limb(*ends, surface_m=500.0, refraction=refraction))[known].all()
     assert 100 < hidden.sum() < 400
@@ -354,11 +358,11 @@ def test_a_flight_is_held_against_the_ground_where_it_is_there():
         assert times.tolist() == seconds.tolist()
         return state
 
-    check_on_raster(at, ground(0.6), 399.0, 5.0)
+    check_above_raster_ground(at, ground(0.6), 399.0, 5.0)
     with pytest.raises(ValueError, match=r"latitude 0\.5, longitude 7\.02 and never over it"):
-        check_on_raster(at, ground(9.0), 0.0, 5.0)
+        check_above_raster_ground(at, ground(9.0), 0.0, 5.0)
     with pytest.raises(ValueError, match=r"is 600 m high under .* at 600 m at 3 s"):
-        check_on_raster(at, ground(0.6), 600.0, 5.0)
+        check_above_raster_ground(at, ground(0.6), 600.0, 5.0)
     with pytest.raises(ValueError, match=r"height_m is 700: .* at 700 m at 2 s"):
         check_above_terrain(at, 700.0, 5.0)
 
@@ -369,12 +373,12 @@ def test_an_ownship_that_moves_between_samples_turns_by_the_shortest_radius():
     moves_m = (6378137.0 * (1.0 - 0.00669437999014) + 1.0e4) * math.radians(1.0)
     # It may be that much lower, too: the normal turns a little faster there.
     ratio = moves_m / (6378137.0 * (1.0 - 0.00669437999014) + 2.0e4 - moves_m)
-    latitudes, heights, turns = _position_bounds(state, moves_m)
+    latitudes, heights, turns = _latitude_and_altitude_bounds(state, moves_m)
     assert turns == pytest.approx(ratio, rel=1e-12)
     assert latitudes == pytest.approx((10.0 - math.degrees(ratio), 12.0 + math.degrees(ratio)))
     assert heights == pytest.approx((2.0e4 - moves_m, 3.0e4 + moves_m))
     near = SimpleNamespace(lat_deg=np.array([-89.5, 89.5]), alt_m=np.zeros(2))
-    assert _position_bounds(near, moves_m)[0] == (-90.0, 90.0)
+    assert _latitude_and_altitude_bounds(near, moves_m)[0] == (-90.0, 90.0)
 
 
 def test_a_scene_whose_ownship_flies_into_the_ground_is_refused():

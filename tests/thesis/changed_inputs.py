@@ -6,7 +6,7 @@ from typing import Any
 
 from components.thesis import flight_tests, scenes
 from components.thesis.scenes import configs
-from dsa_des.scene.scene import load_tables
+from dsa_des.scene.scene import scene_from_tables
 from dsa_des.scene.scene_file import SceneFile, read_scene_file
 
 FACTOR = 0.93
@@ -58,9 +58,9 @@ def change(monkeypatch: Any, inputs: tuple[str, ...]) -> None:
     rewrite(monkeypatch, apply)
     if "thesis/table_4_2.csv" in keys:
         (column,) = keys["thesis/table_4_2.csv"]
-        rows = [{**row, column: FACTOR * float(row[column])} for row in scenes.read_csv(
+        rows = [{**row, column: FACTOR * float(row[column])} for row in scenes.read_thesis_csv(
             "table_4_2.csv")]  # fmt: skip
-        monkeypatch.setattr(flight_tests, "read_csv", lambda name: rows)
+        monkeypatch.setattr(flight_tests, "read_thesis_csv", lambda name: rows)
 
 
 def rewrite(monkeypatch: Any, apply: Callable[[Path, SceneFile], None]) -> None:
@@ -72,7 +72,7 @@ def rewrite(monkeypatch: Any, apply: Callable[[Path, SceneFile], None]) -> None:
         return scene_file
 
     def load(path: Path, sets: Any = (), swaps: Any = ()) -> Any:
-        return load_tables(read(path), sets=sets, swaps=swaps, seed=None, duration_s=None)
+        return scene_from_tables(read(path), sets=sets, swaps=swaps, seed=None, duration_s=None)
 
     monkeypatch.setattr(scenes, "read_scene_file", read)
     monkeypatch.setattr(scenes, "load_scene", load)

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from components.aircraft.aspect_tables import read_aspect_table
+from components.aircraft.aspect_tables import read_silhouette_table
 from components.optical.silhouette import visible_area
-from components.thesis.scenes import silhouette_areas as areas_of
+from components.thesis.scenes import silhouette_area_keywords as areas_of
 from components.thesis.silhouette_comparison import AXES, compare_silhouettes
 from components.thesis.silhouettes import ERRORS, MEASURED_ON, TABLES
 
@@ -20,7 +20,7 @@ def test_the_errors_are_those_of_the_tables(file) -> None:
     path = FOLDER / TABLES[file]
     if not path.is_file():
         pytest.skip(f"{TABLES[file]} of degas-surveillance-jwandrews is not at {FOLDER}")
-    table = read_aspect_table(path)
+    table = read_silhouette_table(path)
     areas = areas_of(file)
     found = compare_silhouettes(
         {"thesis": lambda *view: visible_area(*view, **areas, model="thesis")},

@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from components.thesis.reproduce import footnotes, four_digit_text, markdown_table_row
+from components.thesis.reproduce import (
+    footnote_letters_by_text,
+    four_digit_text,
+    markdown_table_row,
+)
 from components.thesis.rows import Made, Row, predicted
 from components.thesis.table import ITEMS, Item, select_items
 from dsa_des.cli import main
@@ -141,7 +145,7 @@ def test_page_holds_every_row_with_its_verdict(results):
     """docs/thesis.md is what the command writes; times of a run are not compared."""
     page = (ROOT / "docs" / "thesis.md").read_text(encoding="utf-8")
     for made in results.values():
-        said = footnotes(made.rows)
+        said = footnote_letters_by_text(made.rows)
         assert all(f"{letter} {text}" in page for text, letter in said.items())
         for row in made.rows:
             if row.unit in ("s", "1/s"):

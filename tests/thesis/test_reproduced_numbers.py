@@ -223,8 +223,10 @@ def test_every_row_is_computed_and_says_why(results):
 def test_what_must_come_near_comes_near(results):
     """Everything the thesis prints and computes rightly from what it prints."""
     for item in ("fig-3.11", "table-4.1", "fig-4.14", "fig-4.17", "fig-4.19", "fig-4.22"):
-        assert all(row.is_near for row in results[item].rows if row.printed is not None), item
-    near = {row.quantity for row in results["table-4.4"].rows if row.is_near}
+        assert all(
+            row.is_within_tolerance for row in results[item].rows if row.printed is not None
+        ), item
+    near = {row.quantity for row in results["table-4.4"].rows if row.is_within_tolerance}
     assert near == {
         "Ascending head-on, Convair, thesis's eq. 9-13",
         "Level abeam, King Air, thesis's eq. 9-13",

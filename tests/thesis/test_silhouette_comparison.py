@@ -9,7 +9,7 @@ from components.thesis.silhouette_comparison import (
     AXES,
     camera_angles_over_half_turn,
     compare_silhouettes,
-    comparison_table,
+    comparison_table_text,
     draw_comparison,
 )
 
@@ -76,7 +76,7 @@ def test_thesis_model_differs_only_where_it_projects_twice():
 
 def test_against_table_and_mesh_of_a_made_up_aircraft(synthetic_aircraft, tmp_path):
     mesh = TriangleMesh(*synthetic_aircraft, rows=256)
-    table = mesh.tabulate(15.0)
+    table = mesh.build_silhouette_table(15.0)
     parts = {"front_m2": np.pi, "side_m2": 26.0, "horizontal_m2": 38.0}
     results = compare_silhouettes(
         {name: model(**parts, model=name) for name in ("exact", "thesis", "convex_hull")},
@@ -93,7 +93,7 @@ def test_against_table_and_mesh_of_a_made_up_aircraft(synthetic_aircraft, tmp_pa
     exact = [one for one in results if one.model == "exact"]
     assert np.mean([one.mean_error for one in exact]) < 0.115
 
-    text = comparison_table(results).splitlines()
+    text = comparison_table_text(results).splitlines()
     assert len(text) == 19
     assert " ".join(text[0].split()) == "model reference axis mean error max error"
     assert text[1].split()[:3] == ["exact", "mesh", "x"] and text[1].endswith("%")

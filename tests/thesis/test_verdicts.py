@@ -16,9 +16,9 @@ from components.thesis.rows import (
     calibrated,
     configured,
     predicted,
-    tally,
+    tally_sentence,
 )
-from components.thesis.scenes import configs, read_csv
+from components.thesis.scenes import configs, read_thesis_csv
 from dsa_des.scene.scene_file import read_scene_file
 from tests.thesis.changed_inputs import FACTOR, change, changed, found, rewrite
 
@@ -92,8 +92,8 @@ def test_a_row_beside_a_printed_number_takes_what_is_said_of_it_but_for_what_it_
     assert number.compare("q", 9.2, "", "", basis, tolerance=0.0).verdict_text.endswith("of a test")
     far = number.compare("q", 9.3, "km", "So.", basis, because="of the row", again="p")
     assert far == Row("q", 9.3, "km", "So.", "9.14", 0.1, "of the row", basis, again="p")
-    assert Printed("9.14").compare("q", 9.144, "", "", basis).is_near
-    assert not Printed("9.14").compare("q", 9.146, "", "", basis).is_near
+    assert Printed("9.14").compare("q", 9.144, "", "", basis).is_within_tolerance
+    assert not Printed("9.14").compare("q", 9.146, "", "", basis).is_within_tolerance
 
 
 def test_only_a_prediction_counts_and_only_once() -> None:
@@ -105,7 +105,7 @@ def test_only_a_prediction_counts_and_only_once() -> None:
         Row("d", 1.0, "", "", "1", basis=configured("x")),
         Row("e", 1.0, "", ""),
     ]
-    assert tally(rows) == (
+    assert tally_sentence(rows) == (
         "6 rows: 2 predicted, 1 calibrated, 1 configured, 1 differs because, 1 no value printed. "
         "Only a prediction counts as agreement: of 2 printed numbers that are predicted, "
         "1 agree: a."
@@ -156,7 +156,7 @@ def test_every_input_exists(results) -> None:
         for name in row.basis.inputs if row.basis else ():
             file, key = name.split(":")
             if file.endswith(".csv"):
-                assert key in read_csv(Path(file).name)[0]
+                assert key in read_thesis_csv(Path(file).name)[0]
             elif file.endswith(".toml"):
                 found(read_scene_file(configs() / file).data, key)
             else:

@@ -18,12 +18,14 @@ from dsa_des.time.clock import (
 )
 from dsa_des.time.randomness import Streams
 
-DRAWS = Streams(5).scan_normals("radar", "clock jitter")
+DRAWS = Streams(5).scan_normal_function("radar", "clock jitter")
 
 
 def clocks_of(*specs):
     """Return clocks with a common resolution, and that resolution."""
-    ticks_per_s = common_ticks_per_second(time for spec in specs for time in spec.exact_times())
+    ticks_per_s = common_ticks_per_second(
+        time for spec in specs for time in spec.times_needing_whole_ticks()
+    )
     return [ScanClock(spec, ticks_per_s, DRAWS) for spec in specs], ticks_per_s
 
 
@@ -32,7 +34,7 @@ def spec_of(rate, offset=0, **kwargs):
 
 
 def ticks_within(clock, ticks_per_s, seconds):
-    return clock.between(0, seconds * ticks_per_s)[1]
+    return clock.scans_between(0, seconds * ticks_per_s)[1]
 
 
 @pytest.mark.parametrize(
@@ -60,7 +62,7 @@ def test_two_clocks_meet_exactly_as_often_as_rational_arithmetic_says(
 
 def test_every_scan_of_the_slow_clock_is_shared_and_is_the_third_of_the_fast_one():
     (slow, fast), ticks_per_s = clocks_of(spec_of(10), spec_of(30))
-    scans, ticks = slow.between(0, 3600 * ticks_per_s)
+    scans, ticks = slow.scans_between(0, 3600 * ticks_per_s)
     assert np.array_equal(ticks, fast.ticks(3 * scans))
     assert len(scans) == 36_000
 
@@ -148,8 +150,8 @@ def test_windows_partition_the_scans(rate, offset, ppm, jitter_s, cuts, later):
     (clock,), ticks_per_s = clocks_of(spec)
     bounds = sorted({int((later + cut) * ticks_per_s) for cut in [0, 4, *cuts]})
     assume(bounds[-1] < MAX_TICK)  # a scene that needs more is refused when it is loaded
-    whole = clock.between(bounds[0], bounds[-1])
-    parts = [clock.between(a, b) for a, b in itertools.pairwise(bounds)]
+    whole = clock.scans_between(bounds[0], bounds[-1])
+    parts = [clock.scans_between(a, b) for a, b in itertools.pairwise(bounds)]
     for position in (0, 1):
         assert np.array_equal(np.concatenate([part[position] for part in parts]), whole[position])
     scans, ticks = whole
@@ -168,8 +170,8 @@ def test_a_scan_at_the_edge_of_a_window_belongs_to_the_next():
     (clock,), _ = clocks_of(ClockSpec(Fraction(10), jitter_s=0.004))
     edges = clock.ticks(np.arange(1, 20)).tolist()
     for scan, edge in enumerate(edges, start=1):
-        assert clock.between(0, edge)[0].tolist() == list(range(scan))
-        assert clock.between(edge, edges[-1] + 1)[0].tolist() == list(range(scan, 20))
+        assert clock.scans_between(0, edge)[0].tolist() == list(range(scan))
+        assert clock.scans_between(edge, edges[-1] + 1)[0].tolist() == list(range(scan, 20))
 
 
 def test_jitter_moves_scans_by_its_deviation_and_never_before_the_start():
@@ -201,7 +203,7 @@ def test_jitter_is_its_deviation_times_what_is_drawn_and_less_than_half_a_period
 
 def test_jitter_is_a_function_of_seed_block_and_scan_only():
     def ticks(seed, block, scans):
-        draw = Streams(seed).scan_normals(block, "clock jitter")
+        draw = Streams(seed).scan_normal_function(block, "clock jitter")
         return ScanClock(ClockSpec(Fraction(10), jitter_s=0.001), 10**9, draw).ticks(scans)
 
     scans = np.arange(100)
@@ -226,19 +228,19 @@ def test_nothing_is_before_the_instant_that_is_said_to_have_nothing_before_it(ji
     spec = ClockSpec(Fraction(30000, 1001), Fraction(1, 8), Fraction(-40), jitter_s)
     clock = ScanClock(spec, 30_000 * 10**6, lambda scans: np.sin(7.0 * scans))
     for tick in np.linspace(0, 10**12, 500).astype(int).tolist():
-        none_before = clock.next_scan_bound(tick)
-        assert len(clock.between(tick, none_before)[0]) == 0
-        first = clock.between(tick, tick + clock.offset + 2 * int(clock.period))[1][0]
+        none_before = clock.lower_bound_of_next_scan(tick)
+        assert len(clock.scans_between(tick, none_before)[0]) == 0
+        first = clock.scans_between(tick, tick + clock.offset + 2 * int(clock.period))[1][0]
         assert none_before <= first
         assert none_before == first or jitter_s
 
 
 def test_the_window_holds_its_start_and_not_its_end():
     (clock,), ticks_per_s = clocks_of(spec_of(2))
-    assert clock.between(0, ticks_per_s)[0].tolist() == [0, 1]
-    assert clock.between(0, ticks_per_s + 1)[0].tolist() == [0, 1, 2]
-    assert clock.between(ticks_per_s, ticks_per_s)[0].size == 0
-    assert clock.between(ticks_per_s, 0)[0].size == 0
+    assert clock.scans_between(0, ticks_per_s)[0].tolist() == [0, 1]
+    assert clock.scans_between(0, ticks_per_s + 1)[0].tolist() == [0, 1, 2]
+    assert clock.scans_between(ticks_per_s, ticks_per_s)[0].size == 0
+    assert clock.scans_between(ticks_per_s, 0)[0].size == 0
 
 
 def test_an_offset_that_is_no_whole_tick_is_refused():

@@ -166,4 +166,4 @@ def test_streams_of_a_run_are_those_of_its_seed():
     scans = np.arange(5)
     via_run = Streams(9).stream("ir", "noise").normal(np.uint64(0), scans)
     assert np.array_equal(via_run, Stream(9, "ir", "noise").normal(np.uint64(0), scans))
-    assert np.array_equal(via_run, Streams(9).scan_normals("ir", "noise")(scans))
+    assert np.array_equal(via_run, Streams(9).scan_normal_function("ir", "noise")(scans))

@@ -11,7 +11,11 @@ from components.estimation.covariance_intersection import intersect_covariances,
 from components.estimation.frame import frame_change
 from components.estimation.motion import ConstantVelocity
 from components.track_fusion.local_tracks import LocalTracks
-from components.track_fusion.track_association import MatchRules, drop_strays, gate_distance_ratio
+from components.track_fusion.track_association import (
+    MatchRules,
+    gate_distance_ratio,
+    reset_numbers_of_strays,
+)
 
 
 def covariances(seed, count):
@@ -119,7 +123,7 @@ def test_a_member_leaves_beyond_three_times_its_gate():
     gate_m = np.sqrt(chi2.ppf(0.9, 6) * (4.0 + 9.0))
     state = np.zeros((6, 3))
     state[1] = [0.0, 2.99 * gate_m, 3.01 * gate_m]
-    found = drop_strays(RULES, tracks_of(state=state), np.zeros(3))
+    found = reset_numbers_of_strays(RULES, tracks_of(state=state), np.zeros(3))
     assert found.system.tolist() == [7, 7, 0]
 
 
@@ -133,7 +137,7 @@ def test_a_direction_leaves_beyond_three_times_its_own_gate():
         state=state, ranged=np.array([True, False, False]), azimuth_variance_rad2=variance,
         azimuth_rad=np.array([0.0, 2.99, -3.01]) * gate_rad, elevation_variance_rad2=variance,
     )  # fmt: skip
-    assert drop_strays(RULES, tracks, np.zeros(3)).system.tolist() == [7, 7, 0]
+    assert reset_numbers_of_strays(RULES, tracks, np.zeros(3)).system.tolist() == [7, 7, 0]
 
 
 def test_a_pair_s_distance_is_its_own_whoever_stands_beside_it():

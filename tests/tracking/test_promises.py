@@ -14,12 +14,12 @@ from components.messages.detections import (
     LastingError,
     LastingPart,
     SensorOffer,
-    report_interval_promises,
+    range_and_report_interval_pairs,
 )
 from components.surveillance.reception import (
     certain_reception_probability,
     do_365_reception_probability,
-    time_to_receive_s,
+    time_to_receive_95_percent_s,
 )
 from components.tracking.due_detections import Promises
 from components.tracking.rules import LastingErrors
@@ -190,12 +190,14 @@ def test_a_given_time_is_that_time():
 
 def test_messages_promise_what_they_do():
     """95 % within 3 s and 7 s is what DO-365 says, and what its law is made of."""
-    near, far = time_to_receive_s(
+    near, far = time_to_receive_95_percent_s(
         do_365_reception_probability(np.array([9.0, 11.0]) * NAUTICAL_MILE_M)
     )
     assert (near, far) == pytest.approx((3.0 + 0.2, 7.0 + 0.2))
-    assert time_to_receive_s(certain_reception_probability(np.zeros(1))) == pytest.approx([0.7])
-    assert time_to_receive_s(np.zeros(1)) == [60.0]
+    assert time_to_receive_95_percent_s(
+        certain_reception_probability(np.zeros(1))
+    ) == pytest.approx([0.7])
+    assert time_to_receive_95_percent_s(np.zeros(1)) == [60.0]
 
 
 def test_promises_hold_by_range():
@@ -207,10 +209,13 @@ def test_promises_hold_by_range():
 
 
 def test_who_looks_often_promises_nothing_of_its_looks():
-    assert report_interval_promises(2.0) == ()
-    assert report_interval_promises(2.5) == ((math.inf, 2.5),)
-    assert report_interval_promises(2.5, [(10.0, 1.0), (20.0, 7.0)]) == ((10.0, 2.5), (20.0, 7.0))
-    assert report_interval_promises(1.0, [(10.0, 0.6)]) == ((10.0, 0.6),)
+    assert range_and_report_interval_pairs(2.0) == ()
+    assert range_and_report_interval_pairs(2.5) == ((math.inf, 2.5),)
+    assert range_and_report_interval_pairs(2.5, [(10.0, 1.0), (20.0, 7.0)]) == (
+        (10.0, 2.5),
+        (20.0, 7.0),
+    )
+    assert range_and_report_interval_pairs(1.0, [(10.0, 0.6)]) == ((10.0, 0.6),)
 
 
 def test_a_miss_is_counted_once_in_the_time_that_is_promised():
@@ -233,7 +238,7 @@ def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
     measured = np.arange(21.0).reshape(7, 3)
     measured[:, 1] = np.nan
     looks = _Looks(measured, np.array([0, 1, 3]), np.vstack([place, np.zeros((3, 2))]))
-    turned = Scans.rotate_to_frame(looks, origin).measured
+    turned = Scans.rotate_velocities_to_frames(looks, origin).measured
     assert turned is not measured and np.array_equal(turned[:4], measured[:4], equal_nan=True)
     for entry, look in ((0, 0), (2, 1)):
         ecef = pymap3d.enu2uvw(*measured[[5, 4], entry], -measured[6, entry], *place[:2, look])
@@ -241,7 +246,7 @@ def test_velocities_of_looks_are_turned_into_the_axes_of_their_frames():
         assert turned[4:, entry] == pytest.approx([north, east, -up], abs=1e-6)
     assert np.isnan(turned[4:, 1]).all()
     silent = replace(looks, measured=np.full((7, 3), np.nan))
-    assert Scans.rotate_to_frame(silent, origin) is silent
+    assert Scans.rotate_velocities_to_frames(silent, origin) is silent
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from components.traffic.overhead_wires import OverheadWire, Post, catenary
+from components.traffic.overhead_wires import OverheadWire, Post, catenary_points_m
 from dsa_des.errors import SceneError
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import load_scene
@@ -18,7 +18,7 @@ def wire(**keys):
 
 def test_a_wire_hangs_as_a_catenary_does():
     first, last = np.array([0.0, 0.0, 7.0]), np.array([0.0, 300.0, 7.0])
-    points = catenary(first, last, 20.0, 1.0)
+    points = catenary_points_m(first, last, 20.0, 1.0)
     assert points[:, 2].min() == pytest.approx(7.0 - 20.0, abs=1e-9)
     np.testing.assert_allclose(points[[0, -1]], [first, last], atol=1e-9)
     # z'' = sqrt(1 + z'^2) / a, with one a along the wire.
@@ -30,7 +30,7 @@ def test_a_wire_hangs_as_a_catenary_does():
 
 
 def test_pieces_join_from_post_to_post():
-    made = list(wire().piece_intruders())
+    made = list(wire().piece_intruder_keys())
     assert [piece["name"] for piece in made[:2]] == ["w-1", "w-2"] and len(made) == 20
     end = np.array([-100.0, 50.0, 3.0])
     for piece in made:

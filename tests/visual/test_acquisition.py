@@ -10,7 +10,7 @@ from components.visual.acquisition import (
     acquisition_rate_per_s,
     integrate_rate_while_shown,
     integrated_acquisition_rate,
-    probability_met_by_round,
+    search_round_look_probability,
 )
 
 KNOT_MPS, FOOT_M, NMI_M = 1852.0 / 3600.0, 0.3048, 1852.0
@@ -51,7 +51,7 @@ def test_a_search_that_comes_round_gives_the_published_table(speed_kt):
     shows_m = 40.0 * FOOT_M / math.radians(9.0 / 60.0)
     speed = speed_kt * KNOT_MPS
     for looking, published in zip((1.0, 2.0 / 3.0, 1.0 / 3.0), MORRIS[speed_kt], strict=True):
-        found = probability_met_by_round(
+        found = search_round_look_probability(
             speed, from_m=shows_m, to_m=12.5 * speed, round_s=36.0, looking=looking
         )
         # "Less than" the numbers of two places, as the abstract says of an upper bound.

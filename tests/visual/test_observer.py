@@ -8,7 +8,7 @@ from covering import covers
 from wired import chain, rows, run
 
 import dsa_des
-from components.visual.acquisition import integrated_acquisition_rate, probability_met_by_round
+from components.visual.acquisition import integrated_acquisition_rate, search_round_look_probability
 from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import MemorySink
 from dsa_des.replicas.changed_scene import Replica, replica_scene
@@ -97,7 +97,7 @@ def test_a_search_that_comes_round_sees_the_share_of_a_round(round_s):
     pilot = {"search": "round", "round_s": round_s, "smallest_arcmin": 4.0}
     found, deviation = share_seen(pilot, before_s=8.0)
     shows_m = math.sqrt(AREA_M2 * 4.0 / math.pi) / math.radians(4.0 / 60.0)
-    expected = probability_met_by_round(
+    expected = search_round_look_probability(
         CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=round_s
     )
     assert 0.2 < expected < 0.5
@@ -160,7 +160,7 @@ def test_a_search_in_glances_comes_round_so_much_later():
     pilot = {"search": "round", "round_s": 30.0, "smallest_arcmin": 4.0, "left_looking": 0.5}
     found, deviation = share_seen(pilot, before_s=8.0, targets=600)
     shows_m = math.sqrt(AREA_M2 * 4.0 / math.pi) / math.radians(4.0 / 60.0)
-    expected = probability_met_by_round(
+    expected = search_round_look_probability(
         CLOSING_MPS, from_m=shows_m, to_m=8.0 * CLOSING_MPS, round_s=60.0
     )
     assert 0.15 < expected < 0.3

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from components.well_clear.separation import FINEST_S, first_inside_cylinder
+from components.well_clear.separation import FINEST_S, first_time_inside_cylinder_s
 
 D_M, Z_M = 610.0, 76.0
 
@@ -26,7 +26,7 @@ def first_of(apart, begin_s, end_s, fastest, across_m=D_M):
     """The one found for a single pair."""
     between = np.array([begin_s]), np.array([end_s])
     speeds = np.array([fastest])
-    return first_inside_cylinder(lambda _, t: apart(t), between, speeds, across_m, Z_M)[0]
+    return first_time_inside_cylinder_s(lambda _, t: apart(t), between, speeds, across_m, Z_M)[0]
 
 
 def root(apart, begin_s, end_s):
@@ -60,7 +60,7 @@ def test_begins_of_many_pairs_are_within_the_bound():
         return found
 
     fastest = np.array([speed for _, speed in each])
-    first = first_inside_cylinder(apart, (begin_s, end_s), fastest, D_M, Z_M)
+    first = first_time_inside_cylinder_s(apart, (begin_s, end_s), fastest, D_M, Z_M)
     assert np.isnan(first[7])
     wanted = np.array([
         root(alone, b, e) if e > b else math.nan
@@ -74,7 +74,7 @@ def test_begins_of_many_pairs_are_within_the_bound():
     # As many as metrics have of two thousand rings of nine; only the last two have any time.
     begin_s = np.append(np.ones(71_999), begin_s[138:])
     end_s = np.append(np.zeros(71_999), end_s[138:])
-    many = first_inside_cylinder(
+    many = first_time_inside_cylinder_s(
         lambda pair, time_s: apart(pair - 71_861, time_s), (begin_s, end_s),
         np.full(len(begin_s), fastest.max()), D_M, Z_M,
     )  # fmt: skip

@@ -9,7 +9,7 @@ import pytest
 from components.flights.closest_approach import KnownTimes
 from components.flights.sampled_flight import SampledTrajectory
 from components.geometry import enu_to_geodetic
-from components.metrics.losses import first_losses_s
+from components.metrics.losses import flight_times_first_within_s
 from components.metrics.separation import RelativeFlight
 from components.well_clear.plane_pairs import PairPaths, PairsInPlane, closest_meetings
 from dsa_des.arrays.types import FloatArray
@@ -64,9 +64,11 @@ def turning_pairs(rng: np.random.Generator, count: int, far_m: float, up_m: floa
 def test_what_is_sure_is_what_the_flights_do(far_m: float, up_m: float) -> None:
     paths = turning_pairs(np.random.default_rng(int(far_m)), 80, far_m, up_m)
     pairs = PairsInPlane(paths)
-    found = ~np.isnan(first_losses_s([relative(paths, k) for k in range(80)], *SIZES_M))
+    found = ~np.isnan(
+        flight_times_first_within_s([relative(paths, k) for k in range(80)], *SIZES_M)
+    )
     for k, limits in enumerate(SIZES_M):
-        surely, unsure = pairs.masks_surely_and_unsurely_inside(*limits)
+        surely, unsure = pairs.masks_sure_and_uncertain_entry(*limits)
         assert not (surely & unsure).any()
         assert surely[~unsure].tolist() == found[~unsure, k].tolist()
         assert 3 < surely.sum() < 77 and unsure.sum() < 45
@@ -87,10 +89,10 @@ def test_what_the_plane_cannot_tell_is_left_to_the_flights() -> None:
         shift = np.array(change)[:, np.newaxis, np.newaxis]
         surely, unsure = PairsInPlane(
             PairPaths(near.time_s, near.own_m + shift, near.other_m + shift)
-        ).masks_surely_and_unsurely_inside(*SIZES_M[0])
+        ).masks_sure_and_uncertain_entry(*SIZES_M[0])
         assert unsure.all() and not surely.any()
     one = PairPaths(near.time_s[:1], near.own_m[:, :1], near.other_m[:, :1])
-    assert PairsInPlane(one).masks_surely_and_unsurely_inside(*SIZES_M[0])[1].all()
+    assert PairsInPlane(one).masks_sure_and_uncertain_entry(*SIZES_M[0])[1].all()
 
 
 def straight(*pairs: tuple[tuple[float, ...], tuple[float, ...]]) -> PairPaths:
@@ -174,7 +176,7 @@ def test_pairs_are_inside_where_closely_spaced_places_on_their_ways_are() -> Non
     own = np.zeros_like(apart)
     surely, unsure = PairsInPlane(
         PairPaths(np.array([0.0, 4.0, 9.0]), own, apart)
-    ).masks_surely_and_unsurely_inside(*limits)
+    ).masks_sure_and_uncertain_entry(*limits)
     share = np.linspace(0.0, 1.0, 1501)[:, None]
     inside = np.zeros(count, dtype=bool)
     for k in (0, 1):
@@ -199,6 +201,6 @@ def test_what_is_as_near_a_limit_as_the_plane_errs_is_unsure(
     apart = np.repeat(place, 2).reshape(3, 2, 1)
     pairs = PairsInPlane(PairPaths(np.array([0.0, 1.0]), np.zeros_like(apart), apart))
     said = dict(
-        zip(("surely", "unsure"), pairs.masks_surely_and_unsurely_inside(500.0, 100.0), strict=True)
+        zip(("surely", "unsure"), pairs.masks_sure_and_uncertain_entry(500.0, 100.0), strict=True)
     )
     assert {name for name, is_so in said.items() if is_so[0]} == ({found} if found else set())

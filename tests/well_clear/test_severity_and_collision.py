@@ -7,9 +7,9 @@ import pytest
 from components.well_clear.severity import (
     altimeter_error_mixture,
     collision_probability,
+    horizontal_miss_distance_m,
     laplace_difference_exceedance,
-    loss_severity,
-    miss_distance_m,
+    loss_severity_percent,
 )
 
 FOOT_M = 0.3048
@@ -34,7 +34,7 @@ def test_severity_is_the_norm_taken_twice():
     miss = abs(x * vy - y * vx) / mpmath.hypot(vx, vy)
     both = norm(r / scale, miss / d)
     wanted = 100 * (1 - norm(both, z / (450 * mpmath.mpf("0.3048"))))
-    assert loss_severity(relative)[0] == pytest.approx(float(wanted), rel=1e-13)
+    assert loss_severity_percent(relative)[0] == pytest.approx(float(wanted), rel=1e-13)
 
 
 @pytest.mark.parametrize(
@@ -47,12 +47,12 @@ def test_severity_is_the_norm_taken_twice():
     ],
 )
 def test_severity_of_states_worked_by_hand(relative, wanted):
-    assert loss_severity(state(*relative))[0] == pytest.approx(float(wanted), abs=1e-10)
+    assert loss_severity_percent(state(*relative))[0] == pytest.approx(float(wanted), abs=1e-10)
 
 
 def test_severity_keeps_its_digits_where_it_is_small():
     height_m = 450 * FOOT_M * (1 - 1e-12)
-    found = loss_severity(state(0, 0, height_m, 0, 0, 0))[0]
+    found = loss_severity_percent(state(0, 0, height_m, 0, 0, 0))[0]
     # As the height is written in doubles, at 40 digits.
     with mpmath.workdps(40):
         y = mpmath.mpf(height_m) / mpmath.mpf(450 * FOOT_M)
@@ -61,8 +61,8 @@ def test_severity_keeps_its_digits_where_it_is_small():
 
 
 def test_a_miss_distance_that_is_past_is_the_distance_now():
-    assert miss_distance_m(state(300, 400, 0, 50, 0, 0))[0] == pytest.approx(500.0)
-    assert miss_distance_m(state(-300, 400, 0, 50, 0, 0))[0] == pytest.approx(400.0)
+    assert horizontal_miss_distance_m(state(300, 400, 0, 50, 0, 0))[0] == pytest.approx(500.0)
+    assert horizontal_miss_distance_m(state(-300, 400, 0, 50, 0, 0))[0] == pytest.approx(400.0)
 
 
 @pytest.mark.parametrize("scales", [(35.0, 58.0), (43.0, 43.0), (43.0, 43.0 * (1 + 1e-8))])

@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import trapezoid
 
 from components.well_clear.severity import collision_probability
-from components.well_clear.tcas import recovery_sizes_m, tcas_span
+from components.well_clear.tcas import recovery_cylinder_sizes_m, tcas_advisory_span
 
 FOOT_M, MILE_M = 0.3048, 1852.0
 #: Lowest and highest altitude, ft; TAU s, DMOD nmi, ZTHR ft of traffic and resolution advisories,
@@ -28,7 +28,7 @@ def due(feet, resolution, east_m=0.0, up_m=0.0, closing_mps=0.0, north_m=0.0):
     relative = (-east_m, -north_m, up_m, closing_mps, 0.0, 0.0)
     states = tuple(np.array([float(part)]) for part in relative)
     own = np.array([feet * FOOT_M])
-    found = tcas_span(states, own, np.zeros(1), resolution=resolution, end_s=1.0)
+    found = tcas_advisory_span(states, own, np.zeros(1), resolution=resolution, end_s=1.0)
     return bool(found.begin_s[0] == 0.0)
 
 
@@ -64,7 +64,7 @@ def test_advisories_have_the_sizes_of_their_layer(layer, resolution):
 def test_recovery_keeps_clear_of_the_sizes_of_resolution_advisories(layer):
     sizes = layer[3] or LAYERS[1][3]  # below 1000 ft those of the next layer
     for feet in layer[:2]:
-        radius, height = recovery_sizes_m(np.array([feet * FOOT_M]))
+        radius, height = recovery_cylinder_sizes_m(np.array([feet * FOOT_M]))
         assert (radius[0], height[0]) == pytest.approx((sizes[3] * FOOT_M, sizes[2] * FOOT_M))
 
 

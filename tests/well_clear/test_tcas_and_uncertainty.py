@@ -7,15 +7,15 @@ import pytest
 from components.arguments.units import FOOT_M
 from components.well_clear.detection import (
     Bounds,
-    detection_span,
     select_bounds,
     uncertain_violation_span,
+    violation_or_advisory_span,
 )
 from components.well_clear.tcas import (
     RESOLUTION_ADVISORY,
     TRAFFIC_ADVISORY,
     TcasAdvisory,
-    tcas_span,
+    tcas_advisory_span,
 )
 from components.well_clear.volume import Volume, violation_span
 from tests.well_clear.test_violation_spans import random_states, span_by_bisection
@@ -60,7 +60,7 @@ def test_advisories_are_due_when_the_definition_says_so(table, resolution):
     altitude = draw.uniform(100, 14_000, len(states))
     altitude[1:3] = 2350 * FOOT_M, 10_000 * FOOT_M - 1e-6  # at a bound, which is of the level below
     climb = np.where(np.arange(len(states)) % 3 == 0, draw.normal(0, 8, len(states)), 0.0)
-    found = tcas_span(tuple(states.T), altitude, climb, resolution=resolution, end_s=END_S)
+    found = tcas_advisory_span(tuple(states.T), altitude, climb, resolution=resolution, end_s=END_S)
     met = 0
     with mpmath.workdps(40):
         for number, state in enumerate(states.tolist()):
@@ -81,12 +81,14 @@ def test_advisories_are_due_when_the_definition_says_so(table, resolution):
 def test_only_the_times_looked_at_count():
     state = tuple(np.array([part]) for part in (-3000.0, 0.0, 40.0, 80.0, 0.0, 0.0))
     level = {"altitude_m": np.array([1000.0]), "climb_mps": np.array([0.0]), "resolution": True}
-    whole = tcas_span(state, **level, end_s=60.0)
+    whole = tcas_advisory_span(state, **level, end_s=60.0)
     # 3 km at 80 m/s are more than the 20 s of 1,000 m, 1.5 km are less: due at once.
     assert whole.begin_s > 10.0
     near = (np.array([-1500.0]), *state[1:])
-    assert tcas_span(near, **level, end_s=60.0).begin_s == 0.0
-    part = tcas_span(state, **level, begin_s=whole.begin_s + 2.0, end_s=whole.begin_s + 9.0)
+    assert tcas_advisory_span(near, **level, end_s=60.0).begin_s == 0.0
+    part = tcas_advisory_span(
+        state, **level, begin_s=whole.begin_s + 2.0, end_s=whole.begin_s + 9.0
+    )
     assert part.begin_s == pytest.approx(whole.begin_s + 2.0)
     assert part.end_s == pytest.approx(whole.begin_s + 9.0)
 
@@ -100,7 +102,7 @@ def test_an_ownship_that_comes_to_wider_limits_is_advised_from_there_on(climb_mp
     state = tuple(np.array([part, part]) for part in (0.45 * 1852.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     off_s = np.array([30.0, 70.0])
     own_m = edge_ft * 0.3048 - climb_mps * off_s
-    span = tcas_span(
+    span = tcas_advisory_span(
         state, altitude_m=own_m, climb_mps=np.full(2, climb_mps), resolution=True, begin_s=0.5,
         end_s=60.0,
     )  # fmt: skip
@@ -146,17 +148,17 @@ def test_how_far_spans_reach_is_that_of_the_worst_within_the_bounds():
         np.array(part, float).T for part in zip(*SPANS, strict=True)
     )
     volume = Volume(900.0, 250.0)
-    found = detection_span(volume, tuple(states), None, Bounds(*bounds), begin_s, end_s)
+    found = violation_or_advisory_span(volume, tuple(states), None, Bounds(*bounds), begin_s, end_s)
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
     one = [tuple(states[:, :1]), None, Bounds(*bounds[:, :1]), 0.0, 90.0]
     np.testing.assert_allclose(
-        np.ravel(detection_span(volume, *one)), [4000 / 110, 6000 / 90], rtol=1e-12
+        np.ravel(violation_or_advisory_span(volume, *one)), [4000 / 110, 6000 / 90], rtol=1e-12
     )
     # Nothing said of errors is none.
-    plain = detection_span(volume, tuple(states), None, None, begin_s, end_s)
+    plain = violation_or_advisory_span(volume, tuple(states), None, None, begin_s, end_s)
     np.testing.assert_allclose(plain, violation_span(volume, tuple(states), begin_s, end_s))
     with pytest.raises(ValueError, match="advisories of TCAS II need the ownship's altitude"):
-        detection_span(TcasAdvisory(True), tuple(states), None, None, 0.0, 60.0)
+        violation_or_advisory_span(TcasAdvisory(True), tuple(states), None, None, 0.0, 60.0)
     part = select_bounds(Bounds(*bounds), [0, 4])
     assert [value.tolist() for value in part] == [[100, 0], [20, 0], [10, 0], [1, 0]]
     assert select_bounds(None, [0, 4]) is None

@@ -9,12 +9,12 @@ import numpy as np
 
 from components.aircraft.known_targets import offered_rosters
 from components.foreign.fmu.message_columns import message_column
-from components.foreign.fmu.own_pose import ownship_columns, true_lines_of_sight
+from components.foreign.fmu.own_pose import ownship_motion_and_latest, true_lines_of_sight
 from components.foreign.fmu.parameters import FmuParameters
 from components.foreign.fmu.units import unit_of_column
 from components.foreign.signals import Signals
 from components.messages.detections import Detections
-from components.messages.reach import Reach, farthest_look
+from components.messages.reach import Reach, combined_farthest_look
 from components.messages.steering import Manoeuvre, Manoeuvres
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.run_ticks import RunTicks
@@ -117,7 +117,9 @@ class ForeignFmu(Component):
         self._roster = wiring.detections.roster(known)
         self._sees_own = bool(known)
         self._own: dict[tuple[int, str], FloatArray] = {}
-        reach = farthest_look(c.request for c in self.context.consumers if c.port == "states")
+        reach = combined_farthest_look(
+            c.request for c in self.context.consumers if c.port == "states"
+        )
         if self.p.ownship and math.isfinite(reach.range_m) and reach.lasts_s > 0.0:
             raise ValueError(
                 "a sensor needs to know where aircraft are between instants, as beam_sweep and "
@@ -127,7 +129,7 @@ class ForeignFmu(Component):
         self._saves = type(self).rewindable and self.context.rewinds
         spec = wiring.spec(self.name, self.context.ticks_per_s, rewinds=self._saves)
         self._process = process_for(model.path, alone=model.alone)
-        self._number = self._process.open(spec, self.p.deadline_s)
+        self._number = self._process.create_instance(spec, self.p.deadline_s)
         self._freed: Any = _Shared()
         self._saved = _Saved(0, self._freed.slots)
         self._last: FloatArray = np.array(wiring.defaults)
@@ -159,7 +161,7 @@ class ForeignFmu(Component):
                     raise ValueError(
                         f"{key}: {block!r} gives no {column!r}{did_you_mean(column, offer)}"
                     )
-                self.p.model.unit_conversion(offer[column], variable)
+                self.p.model.unit_factor_and_offset(offer[column], variable)
 
     def warnings(self) -> list[str]:
         """Return a warning if communication points are not at whole internal steps of the FMU."""
@@ -188,18 +190,20 @@ class ForeignFmu(Component):
         """Step the FMU through the instants, and send what it gives."""
         own, wiring = np.arange(len(wake)), self.p.wiring
         scheduled = self.p.model.kind == "se"
-        due = self._due(wake)
+        due = self._ticking_clocks_by_row(wake)
         if scheduled:
             own = np.array(
                 [row for row in own if due[row] or self._has_fmu_timed_clocks], dtype=np.int64
             )
         elif self.p.clock_spec() is not None:
             own = np.flatnonzero(wake.scans >= 0)
-        values, traffic = self._values(wake, own)
+        values, traffic = self._inputs_and_traffic_at_rows(wake, own)
         seen_from = truth = None
         if self.p.detections and self._sees_own:
             moves = wiring.detections.needs_ownship_velocity()
-            seen_from, self._own = ownship_columns(wake, "messages", self._own, moves=moves)
+            seen_from, self._own = ownship_motion_and_latest(
+                wake, "messages", self._own, moves=moves
+            )
             truth = true_lines_of_sight(wake, "messages", len(self._roster))
         if len(own) == 0:
             return None
@@ -239,7 +243,7 @@ class ForeignFmu(Component):
     def _has_fmu_timed_clocks(self) -> bool:
         return any(c.variability in ("countdown", "changing") for c in self.p.model.clocks.values())
 
-    def _due(self, wake: Wake) -> list[list[int]]:
+    def _ticking_clocks_by_row(self, wake: Wake) -> list[list[int]]:
         """Return for each row the numbers of the input clocks that tick then."""
         per_s, ticks = wake.ticks_per_s, wake.ticks
         due: list[list[int]] = [[] for _ in ticks]
@@ -259,7 +263,7 @@ class ForeignFmu(Component):
                 due[row].append(number)
         return due
 
-    def _values(self, wake: Wake, own: IntArray) -> tuple[FloatArray, Any]:
+    def _inputs_and_traffic_at_rows(self, wake: Wake, own: IntArray) -> tuple[FloatArray, Any]:
         """Return the input values at each row, and the traffic messages with the index of the one
         that holds at each row.
 
@@ -280,7 +284,7 @@ class ForeignFmu(Component):
                     unit = unit_of_column(column)
                     if isinstance(message, Signals) and column in message.names:
                         unit = message.units[message.names.index(column)]
-                    self._scales[at] = self.p.model.unit_conversion(unit, variable)
+                    self._scales[at] = self.p.model.unit_factor_and_offset(unit, variable)
                 a, b = self._scales[at]
                 came = a * message_column(message, column, which, key) + b
                 known = np.isfinite(came)
@@ -293,9 +297,9 @@ class ForeignFmu(Component):
         if len(values):
             self._fed = fed[-1].copy()
             self._last = values[-1].copy()
-        return values, self._held_traffic(wake, traffic)
+        return values, self._traffic_and_row_indices(wake, traffic)
 
-    def _held_traffic(self, wake: Wake, came: list[tuple[Any, IntArray]]) -> Any:
+    def _traffic_and_row_indices(self, wake: Wake, came: list[tuple[Any, IntArray]]) -> Any:
         if not self.p.ownship:
             return None
         parts = [] if self._traffic is None else [self._traffic]
@@ -340,18 +344,20 @@ class ForeignFmu(Component):
             states.tick = ticks[there]
             states.flights = None
             for name, output in self.p.ownship.items():
-                place, a, b = wiring.output_conversion(name, output)
+                place, a, b = wiring.output_index_and_conversion(name, output)
                 setattr(states, name, a * numbers[there, place] + b)
             sent["states"] = states
         if self.p.manoeuvre:
-            manoeuvres = self._commands(ticks, numbers)
+            manoeuvres = self._new_manoeuvres(ticks, numbers)
             if manoeuvres is not None:
                 sent["manoeuvres"] = manoeuvres
         return sent
 
-    def _commands(self, ticks: IntArray, numbers: FloatArray) -> Manoeuvres | None:
+    def _new_manoeuvres(self, ticks: IntArray, numbers: FloatArray) -> Manoeuvres | None:
         """Return manoeuvres at the rows whose commanded values are new and not all zero."""
-        how = [self.p.wiring.output_conversion(*item) for item in self.p.manoeuvre.items()]
+        how = [
+            self.p.wiring.output_index_and_conversion(*item) for item in self.p.manoeuvre.items()
+        ]
         told = np.stack([a * numbers[:, place] + b for place, a, b in how], axis=1)
         before = np.vstack([self._told[np.newaxis], told[:-1]])
         changes = [place for place, name in enumerate(self.p.manoeuvre) if name in _CHANGES]

@@ -16,7 +16,7 @@ from components.foreign.fmu.model import TEXT_KINDS, FmuModel
 from components.foreign.reported_look import TRUE_LINE, detections_of_reports
 from components.geometry import wrap_pi
 from components.messages.columns import MEASURED, OWN_VELOCITY, POSE
-from components.messages.detections import Detections, SensorOffer, report_interval_promises
+from components.messages.detections import Detections, SensorOffer, range_and_report_interval_pairs
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.errors import did_you_mean
 from dsa_des.time.clock import ClockSpec
@@ -72,7 +72,7 @@ class _Column:
             variable = wiring.model.variables[output]
             if variable.kind in TEXT_KINDS:
                 raise ValueError(f"{output!r} is no number")
-            first, a, b = wiring.output_conversion(name, output)
+            first, a, b = wiring.output_index_and_conversion(name, output)
             size = wiring.size(variable)
             if element is not None and not 0 <= element < size:
                 raise ValueError(f"{output!r} has the elements 1 to {size}")
@@ -177,12 +177,13 @@ class DetectionOutputs:
             "range_m" in self._columns, math.sqrt(12.0 * max(angles)),
             "range_rate_m_s" in self._columns,
             clock=None if clock is None else lambda: clock,
-            promises=() if clock is None else report_interval_promises(float(clock.period_s)),
+            promises=()
+            if clock is None else range_and_report_interval_pairs(float(clock.period_s)),
             **same,
         )  # fmt: skip
 
     def roster(self, known: Sequence[Roster]) -> Roster:
-        """Return the scene's roster, or else one of the names under ``targets``.
+        """Return the scene's list of target names, or else one of the names under ``targets``.
 
         Raises
         ------

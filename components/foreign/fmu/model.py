@@ -121,7 +121,7 @@ class FmuModel:
             raise ValueError(f"{self.path.name} has no {what} {name!r}{did_you_mean(name, names)}")
         return self.variables[name]
 
-    def unit_conversion(self, unit: str, variable: Variable) -> tuple[float, float]:
+    def unit_factor_and_offset(self, unit: str, variable: Variable) -> tuple[float, float]:
         """Return (a, b): a value x of `unit` is a x + b in the variable's own unit.
 
         Raises
@@ -163,8 +163,8 @@ def read_fmu(path: Path) -> FmuModel:
         said: Any = fmpy.read_model_description(str(path), validate=False)
         with zipfile.ZipFile(path) as archive:
             names = archive.namelist()
-            terminals = _terminals(archive, names)
-            clocks, raised = _clocks(archive)
+            terminals = _terminal_variables_by_member(archive, names)
+            clocks, raised = _clocks_and_output_references(archive)
     except Exception as error:
         first = (str(error).splitlines() or [type(error).__name__])[0]
         raise ValueError(f"{path} is no FMU that can be read: {first}") from error
@@ -271,7 +271,9 @@ def _scale(unit: Any) -> Scale | None:
     return Scale(tuple(map(int, powers)), float(base.factor), float(base.offset))
 
 
-def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, PartitionClock], dict[str, int]]:
+def _clocks_and_output_references(
+    archive: zipfile.ZipFile,
+) -> tuple[dict[str, PartitionClock], dict[str, int]]:
     """Return the input clocks, and the references of the output clocks; FMPy reads neither."""
     clocks, raised = {}, {}
     for item in ElementTree.fromstring(archive.read("modelDescription.xml")).iter("Clock"):
@@ -293,7 +295,9 @@ def _clocks(archive: zipfile.ZipFile) -> tuple[dict[str, PartitionClock], dict[s
     return clocks, raised
 
 
-def _terminals(archive: zipfile.ZipFile, names: list[str]) -> dict[str, dict[str, str]]:
+def _terminal_variables_by_member(
+    archive: zipfile.ZipFile, names: list[str]
+) -> dict[str, dict[str, str]]:
     """Return for each terminal of the FMU the names of its variables by member name."""
     name = "terminalsAndIcons/terminalsAndIcons.xml"
     if name not in names:

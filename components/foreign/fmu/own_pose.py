@@ -6,17 +6,17 @@ import numpy as np
 
 from components.geometry import POSE_FIELDS
 from components.messages.columns import OWN_VELOCITY, POSE
-from components.messages.targets import RelativeTargets, TrafficStates, own_velocity
+from components.messages.targets import RelativeTargets, TrafficStates, own_velocity_ned_m_s
 from dsa_des.arrays.types import FloatArray, IntArray
 from dsa_des.block.wake import Wake
 
 _LEVEL_OF_TRUST = (TrafficStates, RelativeTargets)
 
 
-def ownship_columns(
+def ownship_motion_and_latest(
     wake: Wake, port: str, held: dict[tuple[int, str], FloatArray], *, moves: bool
 ) -> tuple[FloatArray, dict[tuple[int, str], FloatArray]]:
-    """Return the ownship's pose and velocity at a wake's rows, and sources' latest for the next.
+    """Return the ownship's pose and velocity (9, rows), and each source's latest for the next.
 
     What a line of sight was made with (the belief) goes before the traffic's truth.
 
@@ -48,14 +48,14 @@ def ownship_columns(
         mine = np.repeat(held.get(key, np.full(len(found), np.nan))[:, np.newaxis], len(wake), 1)
         if key in came:
             place = np.searchsorted(came[key].tick, wake.ticks, side="right") - 1
-            said = _pose_rows(came[key].message, wake, moves)
+            said = _pose_and_velocity_rows(came[key].message, wake, moves)
             mine[:, place >= 0] = said[:, place[place >= 0]]
         after[key] = mine[:, -1].copy()
         found = np.where(np.isnan(mine), found, mine)
     return found, after
 
 
-def _pose_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
+def _pose_and_velocity_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
     """Return the pose and velocity (9, rows) that a message's rows state; NaN where none."""
     rows = len(message)
     found = np.full((len(POSE) + len(OWN_VELOCITY), rows), np.nan)
@@ -67,7 +67,7 @@ def _pose_rows(message: Any, wake: Wake, moves: bool) -> FloatArray:
     if moves:
         state: IntArray = message.position_ticks
         time_s = state / wake.ticks_per_s
-        found[len(POSE) :] = own_velocity(message, np.arange(rows), time_s)
+        found[len(POSE) :] = own_velocity_ned_m_s(message, np.arange(rows), time_s)
     return found
 
 

@@ -90,7 +90,7 @@ class FmuParameters(Parameters):
         return found
 
     @model_validator(mode="after")
-    def _fits(self) -> "FmuParameters":
+    def _read_and_wire_model(self) -> "FmuParameters":
         try:
             self._model = read_fmu(self.file)
         except ValueError as error:
@@ -108,7 +108,7 @@ class FmuParameters(Parameters):
         return self.note_ineffective("targets", because="without detections and inputs of [*]")
 
     def clock_spec(self) -> ClockSpec | None:
-        """Return when it communicates, if that does not follow from what arrives."""
+        """Return the clock of communication points, or None if arriving messages decide them."""
         if self.model.kind == "se":
             step = _common_step(self.wiring.instants)
             return ClockSpec(1 / step) if step else None

@@ -17,7 +17,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 
 from components.foreign.child_process import ChildProcess, describe_exit
-from dsa_des.text.safe_text import printable, shorten
+from dsa_des.text.safe_text import escape_unprintable, shorten
 
 _ROOT = Path(__file__).parents[3]
 # Ours is looked for last: what runs the FMU finds it where it is not installed, too.
@@ -65,7 +65,7 @@ class FmuProcess:
         self._count = 0
         self.close = child.end
 
-    def open(self, spec: dict[str, Any], deadline_s: float) -> int:
+    def create_instance(self, spec: dict[str, Any], deadline_s: float) -> int:
         """Create an instance of the FMU in the process and return its number."""
         self._count += 1
         self.ask({"do": "open", "instance": self._count, "spec": spec}, max(deadline_s, 10.0))
@@ -104,7 +104,7 @@ class FmuProcess:
             words = self._last_words()
             self.close()
             at = "" if answer["at"] is None else f" at {answer['at']:g} s"
-            error = FmuError(f"{self.path.name}{at}: {printable(answer['failed'])}{words}")
+            error = FmuError(f"{self.path.name}{at}: {escape_unprintable(answer['failed'])}{words}")
             if answer["opening"]:  # it says itself that it cannot be used
                 error.exit_code = 2
             raise error
@@ -126,7 +126,7 @@ class FmuProcess:
             text = (self._folder / "words").read_text(errors="replace")[-2000:]
         except OSError:
             return ""
-        lines = [printable(line) for line in text.splitlines() if line.strip()]
+        lines = [escape_unprintable(line) for line in text.splitlines() if line.strip()]
         return f"; it printed: {shorten(' | '.join(lines[-3:]), 300)}" if lines else ""
 
 
@@ -174,7 +174,7 @@ def _extract(path: Path, folder: Path) -> None:
         root = folder.resolve()
         for name in archive.namelist():
             if "\\" in name or not (root / name).resolve().is_relative_to(root):
-                raise FmuError(f"{path.name} holds the path {printable(name)!r}")
+                raise FmuError(f"{path.name} holds the path {escape_unprintable(name)!r}")
         archive.extractall(folder)
 
 

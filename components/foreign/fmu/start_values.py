@@ -78,7 +78,7 @@ def _convert_value(model: FmuModel, variable: Variable, value: Any) -> Any:
     if kind.startswith("Float"):
         if isinstance(value, str) and " " in value.strip():
             number, unit = value.strip().split(None, 1)
-            a, b = model.unit_conversion(unit, variable)
+            a, b = model.unit_factor_and_offset(unit, variable)
             try:
                 found = a * float(number) + b
             except ValueError:

@@ -24,14 +24,16 @@ _ENDINGS = {
 
 
 def unit_of_column(name: str) -> str:
-    """Return the unit that a column's name ends with, or nothing."""
+    """Return the unit that a column's name ends with, or an empty text."""
     ending = max((end for end in _ENDINGS if name.endswith(end)), key=len, default="")
     return _ENDINGS.get(ending, "")
 
 
 @dataclass(frozen=True)
 class Scale:
-    """A unit: powers of m, s, rad, kg, A, K, mol and cd, and x SI = factor x + offset."""
+    """A unit: its powers of m, s, rad, kg, A, K, mol and cd; x of it are factor x + offset in
+    SI.
+    """
 
     powers: tuple[int, ...]
     factor: float

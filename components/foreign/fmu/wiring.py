@@ -122,19 +122,19 @@ class Wiring:
             elif output in self.model.variables:
                 variable = self.model.variables[output]
                 try:
-                    self.model.unit_conversion(unit_of_column(name), variable)
+                    self.model.unit_factor_and_offset(unit_of_column(name), variable)
                     if self.size(variable) != 1 or variable.kind in TEXT_KINDS:
                         raise ValueError(f"{output!r} is no single number")
                 except ValueError as error:
                     self.wrong.append(f"{key}.{name}: {error}")
 
-    def output_conversion(self, name: str, output: str) -> tuple[int, float, float]:
+    def output_index_and_conversion(self, name: str, output: str) -> tuple[int, float, float]:
         """Return (index, a, b): an output's index among the FMU's numbers, and the factors by which
         a number x is the column's a x + b.
         """
         code = self.names.index(output)
         place = next(i for i, (signal, _) in enumerate(self.layout) if signal == code)
-        a, b = self.model.unit_conversion(unit_of_column(name), self.model.variables[output])
+        a, b = self.model.unit_factor_and_offset(unit_of_column(name), self.model.variables[output])
         return place, 1.0 / a, -b / a
 
     # -- inputs --------------------------------------------------------------------------------
@@ -152,7 +152,7 @@ class Wiring:
         parsed: list[tuple[Variable, int, str]] = []
         for name, source in self._expand_targets(given):
             try:
-                variable, place = self._input(name)
+                variable, place = self._input_and_element_index(name)
             except ValueError as error:
                 self.wrong.append(f"inputs: {error}")
                 continue
@@ -165,7 +165,7 @@ class Wiring:
         for kind in groups:
             for variable in groups[kind]:
                 first[variable.name] = len(self.defaults)
-                self.defaults += self._defaults(variable)
+                self.defaults += self._first_values_or_zeros(variable)
         for variable, place, source in parsed:
             match = _SOURCE.fullmatch(source)
             if match is None:
@@ -205,7 +205,7 @@ class Wiring:
         variable = self.model.variables.get(name)
         return variable is not None and variable.causality == "input"
 
-    def _input(self, name: str) -> tuple[Variable, int]:
+    def _input_and_element_index(self, name: str) -> tuple[Variable, int]:
         match, place = _ELEMENT.fullmatch(name), 0
         if name not in self.model.variables and match and match["name"] in self.model.variables:
             name, place = match["name"], int(match["place"]) - 1
@@ -222,7 +222,7 @@ class Wiring:
             raise ValueError(f"{name!r} has the elements 1 to {self.size(variable)}")
         return variable, place
 
-    def _defaults(self, variable: Variable) -> list[float]:
+    def _first_values_or_zeros(self, variable: Variable) -> list[float]:
         try:
             return first_inputs(self.model, self.p.start, variable)
         except ValueError:  # said of the start values already

@@ -68,14 +68,16 @@ def _own_of_ulog(
     if not name:
         problems.fail(f"holds no position: one of the topics {', '.join(_POSITIONS)} is needed")
     with np.errstate(all="ignore"):
-        yield from _own_samples(topics, name, stem)
+        yield from _own_position_reports(topics, name, stem)
 
 
 #: So many messages are taken at a time.
 _AT_ONCE = 8192
 
 
-def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[PositionReport]:
+def _own_position_reports(
+    topics: Mapping[str, Topic], name: str, stem: str
+) -> Iterator[PositionReport]:
     utc_less_boot_s = _boot_time_utc_s(topics)
     for first in range(0, len(topics[name]["timestamp"]), _AT_ONCE):
         block = slice(first, first + _AT_ONCE)
@@ -87,7 +89,10 @@ def _own_samples(topics: Mapping[str, Topic], name: str, stem: str) -> Iterator[
             lat, lon, alt = own["lat"], own["lon"], own["alt"]
         else:
             lat, lon, alt = own["lat"] * 1e-7, own["lon"] * 1e-7, own["alt"] * 1e-3
-        move, angles = _velocity(topics, own, boot_s), _attitude(topics, boot_s)
+        move, angles = (
+            _track_speed_and_climb(topics, own, boot_s),
+            _latest_yaw_pitch_roll_deg(topics, boot_s),
+        )
         fix = own.get("fix_type", np.full(len(lat), 3.0)) >= 2
         columns = np.stack([boot_s + utc_less_boot_s, lat, lon, alt, *move, *angles])
         for time_s, lat_deg, lon_deg, alt_m, *others in columns[:, fix].T.tolist():
@@ -98,7 +103,7 @@ def _interpolated_values(times_s: FloatArray, values: AnyArray, wanted_s: FloatA
     return np.interp(wanted_s, times_s, np.asarray(values, float))
 
 
-def _velocity(
+def _track_speed_and_climb(
     topics: Mapping[str, Topic], own: dict[str, FloatArray], boot_s: FloatArray
 ) -> list[FloatArray]:
     """Return track (deg), ground speed and climb (m/s) at some times; NaN where there are none."""
@@ -117,7 +122,7 @@ def _velocity(
     return [np.degrees(np.arctan2(east, north)) % 360.0, np.hypot(north, east), -down]
 
 
-def _attitude(topics: Mapping[str, Topic], boot_s: FloatArray) -> list[FloatArray]:
+def _latest_yaw_pitch_roll_deg(topics: Mapping[str, Topic], boot_s: FloatArray) -> list[FloatArray]:
     """Return yaw, pitch and roll (deg) of the last attitude before each time."""
     known = topics.get("vehicle_attitude", {})
     if not len(known.get("timestamp", ())) or "q" not in known:
@@ -228,10 +233,10 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
     callsigns: dict[str, str] = {}
     lost: list[int] = []
     warnings: list[str] = []
-    frames = _frames(data, lost)
+    frames = _numbered_wanted_frames(data, lost)
 
     def each() -> Iterator[tuple[int, PositionReport]]:
-        yield from _read_frames(problems, frames, stem, callsigns)
+        yield from _reports_from_frames(problems, frames, stem, callsigns)
         if lost:
             what = "frame is" if len(lost) == 1 else "frames are"
             warnings.append(f"{len(lost)} {what} damaged and left out")
@@ -240,7 +245,7 @@ def tlog_log(problems: Problems, data: bytes, stem: str) -> Log:
     return Log("a MAVLink log (tlog)", units, each(), callsigns, "frames", warnings, ABOVE_SEA)
 
 
-def _frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:
+def _numbered_wanted_frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:
     """Yield the wanted complete frames with their numbers, skipping damaged ones."""
     at, number = 0, 0
     while at < len(data):
@@ -277,7 +282,7 @@ def _frames(data: bytes, lost: list[int]) -> Iterator[tuple[int, _Frame]]:
         at = end
 
 
-def _read_frames(
+def _reports_from_frames(
     problems: Problems, frames: Iterator[tuple[int, _Frame]], stem: str,
     callsigns: dict[str, str],
 ) -> Iterator[tuple[int, PositionReport]]:  # fmt: skip

@@ -32,7 +32,7 @@ def is_capture(data: bytes) -> bool:
     return data[:4] in _PCAP or data[:4] == _PCAPNG
 
 
-def udp_payloads(problems: Problems, data: bytes) -> list[tuple[float, bytes]]:
+def udp_times_and_payloads(problems: Problems, data: bytes) -> list[tuple[float, bytes]]:
     """Return a capture's UDP datagrams, each its time (s) and content; TrafficFileError if none."""
     problems.of = "packet"
     packets = _read_pcap(problems, data) if data[:4] in _PCAP else _read_pcapng(problems, data)

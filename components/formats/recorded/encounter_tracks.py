@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.recorded.known_kinds import record
+from components.formats.recorded.known_kinds import recording_of_file
 from components.formats.set_file import EncounterSetError
 from components.formats.text_rows import TrafficFileError
 from components.formats.track_files import Tracks
@@ -18,7 +18,7 @@ def recorded_tracks(path: Path, at: tuple[float, float] | None = None) -> Tracks
     are the file's own. EncounterSetError says what is wrong with it.
     """
     try:
-        recording = record(path)
+        recording = recording_of_file(path)
     except TrafficFileError as error:
         raise EncounterSetError(str(error)) from None
     samples = recording.samples

@@ -29,11 +29,11 @@ def igc_log(problems: Problems, data: bytes, stem: str) -> Log:
     """Return a log of an IGC file's flight, with pressure and GNSS (ellipsoid) altitudes."""
     text = text_of(data, problems)
     warnings: list[str] = []
-    fixes = _fixes(problems, text, _name(text) or stem, warnings)
+    fixes = _fixes(problems, text, _name_from_headers(text) or stem, warnings)
     return Log("an IGC file", "m", fixes, {}, "fixes", warnings)
 
 
-def _name(text: str) -> str:
+def _name_from_headers(text: str) -> str:
     for pattern in _NAMES:
         for _, line in islice(iterate_lines(text), 200):
             if (match := pattern.match(line)) and match[1].strip().lower() not in _NAMELESS:
@@ -72,9 +72,9 @@ def _fixes(
             if of_day < last_s - 43_200:  # past midnight
                 day += _DAY
             last_s = of_day
-            lat = _angle(fix[4], fix[5], _digits(line, more.get("LAD")), fix[6] == "S")
-            lon = _angle(fix[7], fix[8], _digits(line, more.get("LOD")), fix[9] == "W")
-            tenths = _digits(line, more.get("TDS"))
+            lat = _angle(fix[4], fix[5], _extension_digits(line, more.get("LAD")), fix[6] == "S")
+            lon = _angle(fix[7], fix[8], _extension_digits(line, more.get("LOD")), fix[9] == "W")
+            tenths = _extension_digits(line, more.get("TDS"))
             time_s = day.timestamp() + of_day + (float(f"0.{tenths}") if tenths else 0.0)
             geometric = float(fix[12]) if fix[10] == "A" else None
             yield (
@@ -89,7 +89,7 @@ def _fixes(
         warnings.append(said)
 
 
-def _digits(line: str, where: slice | None) -> str:
+def _extension_digits(line: str, where: slice | None) -> str:
     """Return further digits that an extension of the fix holds."""
     digits = "" if where is None else line[where]
     return digits if digits.isdigit() else ""

@@ -16,7 +16,7 @@ def is_json(data: bytes) -> bool:
     return data[:4096].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"["))
 
 
-def record_json(
+def recording_of_json(
     problems: Problems,
     data: bytes,
     ownship: str | None = None,
@@ -58,13 +58,13 @@ def _records(
     problems: Problems, data: bytes, warnings: list[str]
 ) -> Iterator[tuple[int, dict[str, Any]]]:
     for number, document in json_documents(problems, data, warnings):
-        for one in _rows_of(document):
+        for one in _records_of_document(document):
             if not isinstance(one, dict):
                 problems.fail(UNKNOWN_JSON, line=number)
             yield number, one
 
 
-def _rows_of(document: Any) -> Iterable[Any]:
+def _records_of_document(document: Any) -> Iterable[Any]:
     """Return a JSON document's records: itself, or the rows of a table pandas wrote by columns."""
     if isinstance(document, dict):
         columns, rows = document.get("columns"), document.get("data")

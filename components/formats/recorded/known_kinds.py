@@ -7,15 +7,15 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from components.formats.asterix_file import recording_of_asterix
-from components.formats.asterix_records import read_records
+from components.formats.asterix_records import decode_records_with_notes
 from components.formats.csv_file import recording_of_rows, recording_of_table
 from components.formats.daa_file import recording_of_daa
 from components.formats.receiver_logs import parse_receiver_log
 from components.formats.recorded import ulog_file
 from components.formats.recorded.autopilot_logs import is_tlog, tlog_log, ulog_log
-from components.formats.recorded.captures import is_capture, udp_payloads
+from components.formats.recorded.captures import is_capture, udp_times_and_payloads
 from components.formats.recorded.igc_file import igc_log, is_igc
-from components.formats.recorded.json_records import is_json, record_json
+from components.formats.recorded.json_records import is_json, recording_of_json
 from components.formats.recorded.xml_tracks import xml_log
 from components.formats.recording import Recording
 from components.formats.reports import Log, build_recording
@@ -56,7 +56,7 @@ _OTHERS = (
 )  # fmt: skip
 
 
-def record(
+def recording_of_file(
     path: Path,
     altitude: Altitude | None = None,
     place: tuple[float, float, float] | None = None,
@@ -92,7 +92,7 @@ def record(
         del data  # its reader holds what it needs of it
         return build_recording(problems, log, None, altitude)
     if is_json(data):
-        return record_json(problems, data, None, altitude, stem)
+        return recording_of_json(problems, data, None, altitude, stem)
     for begins, said in _OTHERS:
         if data.startswith(begins):
             problems.fail(f"{said}; what is read: {KINDS}")
@@ -163,26 +163,26 @@ def _is_asterix(data: bytes) -> bool:
     return at > 0
 
 
-def captured_asterix(path: Path) -> bytes | None:
-    """Return the data blocks of ASTERIX in a capture; None of a file that is none."""
+def asterix_blocks_of_capture(path: Path) -> bytes | None:
+    """Return the ASTERIX data blocks in a packet capture; None if the file is no capture."""
     if path.suffix.lower() not in _CAPTURES:
         return None
     problems = Problems(str(path))
-    _, blocks, _ = _asterix_of_capture(problems, read_content(path, problems))
+    _, blocks, _ = _asterix_time_bytes_and_others(problems, read_content(path, problems))
     return blocks
 
 
 _CAPTURES = (".pcap", ".pcapng", ".cap")
 
 
-def _asterix_of_capture(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
+def _asterix_time_bytes_and_others(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
     """Return when the first ASTERIX datagram was captured, the content of all of them joined, and
     the number of other datagrams.
 
     Where not all can be read, each is tried by itself: other protocols may look like data blocks,
     and a radar may speak an edition that is not known.
     """
-    sent = udp_payloads(problems, data)
+    sent = udp_times_and_payloads(problems, data)
     blocks = [(time_s, payload) for time_s, payload in sent if _is_asterix(payload)]
     path = Path(problems.path)
     if blocks and not _holds_asterix_records(path, b"".join(payload for _, payload in blocks)):
@@ -194,7 +194,7 @@ def _asterix_of_capture(problems: Problems, data: bytes) -> tuple[float, bytes, 
 
 def _holds_asterix_records(path: Path, data: bytes) -> bool:
     try:
-        read_records(path, data)
+        decode_records_with_notes(path, data)
     except TrafficFileError:
         return False
     return True
@@ -205,7 +205,7 @@ def _read_capture(
     place: tuple[float, float, float] | None,
 ) -> Recording:  # fmt: skip
     """Return a `Recording` of a capture's ASTERIX datagrams, dated by the capture's day."""
-    first_s, blocks, other = _asterix_of_capture(problems, data)
+    first_s, blocks, other = _asterix_time_bytes_and_others(problems, data)
     recording = recording_of_asterix(problems, blocks, altitude, of_day_s=first_s, place=place)
     if other:
         recording.notes.warnings.append(

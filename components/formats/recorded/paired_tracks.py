@@ -47,7 +47,7 @@ class TrackWindows:
         #: How many flights have a window.
         self.flights = len({piece.flight for piece in self._pieces})
 
-    def draw_window(self, share: float) -> tuple[int, FloatArray]:
+    def window_at_share(self, share: float) -> tuple[int, FloatArray]:
         """Return a flight's number and the path of its window at a share [0, 1) of all windows.
 
         It is north, east and altitude (3, seconds + 1) in m, north and east from where it is at the

@@ -124,7 +124,7 @@ def move_flight(
 
 
 def cut_to_time(columns: Samples, from_s: float, to_s: float) -> Samples | None:
-    """Return samples from ``from_s`` to ``to_s`` and one more either side; None if not there."""
+    """Return samples from ``from_s`` to ``to_s`` and one beyond each; None if all lie outside."""
     times = columns["time"]
     if times[-1] < from_s or times[0] > to_s:
         return None
@@ -136,7 +136,7 @@ def cut_to_time(columns: Samples, from_s: float, to_s: float) -> Samples | None:
 def cut_to_space(
     columns: Samples, box: tuple[float, float, float, float], heights: tuple[float, float]
 ) -> Samples | None:
-    """Return the samples inside a box (south, north, west, east) and between heights.
+    """Return samples in a box (south, north, west, east; deg) and height range (m), or None.
 
     Where an aircraft was outside it is away. None where it never is inside.
     """

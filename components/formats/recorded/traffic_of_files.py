@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from components.formats.recorded.known_kinds import record
+from components.formats.recorded.known_kinds import recording_of_file
 from components.formats.recorded.selection import (
     choose_ownship,
     cut_to_space,
@@ -110,7 +110,7 @@ def read_traffic(paths: Sequence[Path], choice: TrafficChoice) -> TrafficFile:
 
 def _recording_above_ellipsoid(path: Path, choice: TrafficChoice) -> Recording:
     """Return a recording, its sea-level heights made ellipsoidal if the geoid's height is given."""
-    one = record(path, choice.altitude, choice.place)
+    one = recording_of_file(path, choice.altitude, choice.place)
     if choice.geoid_m and one.above_sea:
         for name in one.above_sea:
             one.samples[name]["alt"] = one.samples[name]["alt"] + choice.geoid_m
@@ -174,10 +174,12 @@ def _refuse_absent(
 ) -> None:
     first_s = min(float(c["time"][0]) for c in others.values())
     last_s = max(float(c["time"][-1]) for c in others.values())
-    ends = f" to {clock(end_s)}" if math.isfinite(end_s) else " on"
+    ends = f" to {instant_as_text(end_s)}" if math.isfinite(end_s) else " on"
     whole.problems.fail(
-        f"no other aircraft is there from {clock(begin_s)}{ends}, in the box and between the "
-        f"heights that are chosen: the files hold {clock(first_s)} to {clock(last_s)}; from_s and "
+        f"no other aircraft is there from {instant_as_text(begin_s)}{ends}, in the box and "
+        f"between the "
+        f"heights that are chosen: the files hold {instant_as_text(first_s)} to "
+        f"{instant_as_text(last_s)}; from_s and "
         "to_s, or own_starts_s, choose another time"
     )
 
@@ -207,7 +209,7 @@ def _warn_of_own_transponder(file: TrafficFile) -> None:
             )
 
 
-def clock(time_s: float) -> str:
+def instant_as_text(time_s: float) -> str:
     """Return an instant as text for people: in UTC where the clock counts from 1970."""
     if not EPOCH_S < time_s < 4e9:
         return f"{time_s:.1f} s"

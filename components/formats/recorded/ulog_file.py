@@ -26,7 +26,7 @@ Topic = Mapping[str, AnyArray]
 def read_topics(
     problems: Problems, data: bytes, wanted: Collection[str], warnings: list[str]
 ) -> dict[str, Topic]:
-    """Return some topics of a log, of several instances the first.
+    """Return the wanted topics of a log by name; of a topic with several instances, the first.
 
     A log that ends within a message is one that lost its power. Where the log is damaged, what
     comes before is read, and a warning says so.
@@ -63,13 +63,13 @@ def read_topics(
                     instances[name] = data[at + 3]
                 topics[int.from_bytes(data[at + 4 : at + 6], "little")] = name
                 rows[name] = bytearray()
-                sizes[name] = _layout(problems, name, formats, 0)[1]
+                sizes[name] = _field_layout_and_length(problems, name, formats, 0)[1]
         at = end
     return {name: _topic(problems, name, formats, rows[name]) for name in rows if rows[name]}
 
 
 def _topic(problems: Problems, name: str, formats: Mapping[str, str], rows: bytearray) -> Topic:
-    fields, size = _layout(problems, name, formats, 0)
+    fields, size = _field_layout_and_length(problems, name, formats, 0)
     dtype = np.dtype({
         "names": list(fields), "formats": [form for form, _ in fields.values()],
         "offsets": [offset for _, offset in fields.values()], "itemsize": size,
@@ -78,10 +78,10 @@ def _topic(problems: Problems, name: str, formats: Mapping[str, str], rows: byte
     return {field: table[field] for field in fields}
 
 
-def _layout(
+def _field_layout_and_length(
     problems: Problems, name: str, formats: Mapping[str, str], deep: int
 ) -> tuple[dict[str, tuple[str, int]], int]:
-    """Return form and place of each field of a message, and how long it is."""
+    """Return each field's NumPy format and byte offset in a message, and the message's length."""
     if name not in formats or deep > _DEEPEST:
         problems.fail(f"the log does not say what {name[:40]!r} holds")
     fields: dict[str, tuple[str, int]] = {}
@@ -94,7 +94,7 @@ def _layout(
         times = int(count[:-1]) if count[:-1].isdigit() else 1
         form = _TYPES.get(kind)
         if form is None:
-            inner, size = _layout(problems, kind, formats, deep + 1)
+            inner, size = _field_layout_and_length(problems, kind, formats, deep + 1)
         else:
             inner, size = {}, np.dtype(form).itemsize
             fields[field] = (f"({times},){form}" if count else form), at

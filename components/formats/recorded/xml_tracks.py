@@ -19,11 +19,11 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
     problems.of = "point"
     head = data[:4096].lower()
     if b"<gpx" in head:
-        points = _points(problems, _read_gpx(problems, data, stem))
+        points = _numbered_position_reports(problems, _read_gpx(problems, data, stem))
         return Log("GPX tracks", "m", points, {}, "points", geometric=ABOVE_SEA)
     if b"<kml" in head or (b"<document" in head and b"<placemark" in data.lower()):
         warnings: list[str] = []
-        points = _points(problems, _read_kml(problems, data, stem, warnings))
+        points = _numbered_position_reports(problems, _read_kml(problems, data, stem, warnings))
         return Log("KML tracks", "m", points, {}, "points", warnings, ABOVE_SEA)
     return None
 
@@ -32,7 +32,9 @@ def xml_log(problems: Problems, data: bytes, stem: str) -> Log | None:
 _Point = tuple[str, float | str | None, float | None, float | None, float | None]
 
 
-def _points(problems: Problems, points: Iterator[_Point]) -> Iterator[tuple[int, PositionReport]]:
+def _numbered_position_reports(
+    problems: Problems, points: Iterator[_Point]
+) -> Iterator[tuple[int, PositionReport]]:
     timed, number = 0, 0
     for number, (name, when, lon, lat, up) in enumerate(points, start=1):
         time_s = None if isinstance(when, str) else when

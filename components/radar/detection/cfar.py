@@ -203,11 +203,11 @@ def _probability(snr: FloatArray, terms: _Terms, model: str) -> FloatArray:
     step = max(1, _AT_ONCE // len(terms.missed))
     for first in range(0, len(finite), step):
         some = finite[first : first + step]
-        result[some] = _sum_terms(n * snr[some], shape, terms)
+        result[some] = _pd_of_signal_quanta(n * snr[some], shape, terms)
     return result
 
 
-def _sum_terms(quanta: FloatArray, shape: float, terms: _Terms) -> FloatArray:
+def _pd_of_signal_quanta(quanta: FloatArray, shape: float, terms: _Terms) -> FloatArray:
     """Return Pd for mean numbers of signal quanta, accurate for small Pd and small 1 - Pd."""
     from scipy.special import gammaln, xlogy
 

@@ -41,9 +41,9 @@ from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
     check_not_negative,
+    check_one_of,
     check_probability,
     check_swerling_model,
-    one_of,
     refuse,
     unflatten,
 )
@@ -146,8 +146,8 @@ def clutter_detection_probability(
     1e-8 at 25 dB and 1e-4 at 30 dB.
     """
     name = check_swerling_model(model)
-    kind = one_of("clutter", clutter, KINDS)
-    rises = one_of("threshold", threshold, ("noise", "adaptive")) == "adaptive"
+    kind = check_one_of("clutter", clutter, KINDS)
+    rises = check_one_of("threshold", threshold, ("noise", "adaptive")) == "adaptive"
     pfa = check_probability("false_alarm_probability", false_alarm_probability)
     refuse(
         "false_alarm_probability",
@@ -207,11 +207,13 @@ def _pd_in_constant_clutter(
         return marcum_q1(mean / total, v / total, largest)
     a = 0.5 * target
     total = noise + a
-    return marcum_q1(mean / total, v / total, largest) + a / total * _slope(mean / total, v / total)
+    return marcum_q1(mean / total, v / total, largest) + a / total * _scaled_q1_derivative(
+        mean / total, v / total
+    )
 
 
-def _slope(c: FloatArray, w: FloatArray) -> FloatArray:
-    """Return M dQ(C/M, V/M)/dM for c = C/M and w = V/M."""
+def _scaled_q1_derivative(c: FloatArray, w: FloatArray) -> FloatArray:
+    """Return M times the derivative by M of Marcum's Q1(C/M, V/M), for c = C/M and w = V/M."""
     from scipy.special import i0e, i1e
 
     root_c, root_w = np.sqrt(c), np.sqrt(w)

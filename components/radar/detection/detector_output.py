@@ -35,7 +35,7 @@ _STEPS = 90
 _LOG_MOST = 600.0
 
 
-def measured_snr(
+def measured_snr_given_detection(
     tail: ArrayLike,
     snr: ArrayLike,
     *,
@@ -43,7 +43,7 @@ def measured_snr(
     pulses: int = 1,
     model: str = "swerling2",
 ) -> Any:
-    """Return a detection's measured SNR, distributed given that it crosses the threshold.
+    """Return detections' measured SNR, which a share `tail` of such detections exceeds.
 
     Detector output over its mean for noise, minus 1, linear, per pulse, from -1 on. `tail` in
     [0, 1] is the share of detections of such echoes that come out stronger, so that uniform numbers
@@ -204,7 +204,7 @@ def false_alarm_count(uniform: ArrayLike, *, cells: int, false_alarm_probability
             f"false_alarm_probability is {float(pfa):g}: with {number:g} cells it must be at most "
             f"{MOST_FALSE_ALARMS / number:g}, for 1e7 false alarms in a scan"
         )
-    first, cumulative = _binomial(number, float(pfa))
+    first, cumulative = _binomial_start_and_cdf(number, float(pfa))
     index = np.searchsorted(cumulative, draws.reshape(-1), side="right")
     count = first + np.minimum(index, len(cumulative) - 1)
     return unflatten(count.astype(np.int64), draws.shape)
@@ -226,7 +226,9 @@ def false_alarm_snr(
     if threshold is None:
         pfa = float(check_probability("false_alarm_probability", false_alarm_probability))
         threshold = float(detection_threshold(check_pulses(pulses), pfa))
-    return np.maximum(measured_snr(1.0 - draws, 0.0, threshold=threshold, pulses=pulses), 0.0)
+    return np.maximum(
+        measured_snr_given_detection(1.0 - draws, 0.0, threshold=threshold, pulses=pulses), 0.0
+    )
 
 
 def _check_uniform(name: str, value: ArrayLike) -> FloatArray:
@@ -242,8 +244,8 @@ def _check_cells(cells: int) -> int:
 
 
 @lru_cache(maxsize=256)
-def _binomial(cells: int, probability: float) -> tuple[int, NDArray[np.float64]]:
-    """Return the first count that matters and the cumulative probabilities from it on."""
+def _binomial_start_and_cdf(cells: int, probability: float) -> tuple[int, NDArray[np.float64]]:
+    """Return the least count of relevant chance and the cumulative probabilities from it on."""
     if cells == 0 or probability == 0.0:
         return 0, np.array([1.0])
     if probability == 1.0:

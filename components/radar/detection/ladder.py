@@ -33,7 +33,7 @@ def pd_truth_errors(block: Component, wake: Wake, cells: IntArray) -> dict[str, 
     from components.high_precision.detection import detection_probability_error
 
     radar: Any = block
-    if not hasattr(radar, "models_in_use"):
+    if not hasattr(radar, "swerling_models_and_cells"):
         raise Unavailable("a boundary or threshold decides: it states no probability")
     if any(map(radar.built, ("clutter", "Doppler", "threshold from reference cells"))):
         raise Unavailable("clutter, filter or CFAR: no evaluation at more digits")
@@ -41,7 +41,7 @@ def pd_truth_errors(block: Component, wake: Wake, cells: IntArray) -> dict[str, 
 
     def values(cells: Cells) -> dict[str, FloatArray]:
         model = np.empty(len(cells))
-        for number, chosen in radar.models_in_use(cells):
+        for number, chosen in radar.swerling_models_and_cells(cells):
             model[chosen] = number
         return {"snr": radar.snr(cells), "model": model, "pd": _pd_of(radar, cells)}
 
@@ -153,7 +153,7 @@ class ExactDetection(Effect[str]):
         return Verdict(True, "detection is 'exact'", bound)
 
     def build(self, block: Any) -> str:
-        """Return the method's name."""
+        """Return the name of the method: `exact`."""
         return "exact"
 
 

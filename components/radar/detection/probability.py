@@ -14,11 +14,11 @@ from components.arguments.checks import (
     FloatArray,
     broadcast_flat,
     check_numbers,
+    check_one_of,
     check_probability,
     check_pulses,
     check_snr,
     check_swerling_model,
-    one_of,
     refuse,
     unflatten,
 )
@@ -142,7 +142,7 @@ def _probability(
     miss: bool,
 ) -> Any:
     name = check_swerling_model(model)
-    one_of("method", method, METHODS)
+    check_one_of("method", method, METHODS)
     shape, ratio, groups = _group_by_pulses_and_pfa(check_snr(snr), pulses, false_alarm_probability)
     result = np.empty_like(ratio)
     # Tiny SNR and probabilities fade to 0; that is their value, not an error.

@@ -149,9 +149,9 @@ def threshold_of(pulses: int, false_alarm_probability: float) -> float:
     for _ in range(4):
         slope = _poisson_at(pulses - 1, threshold)
         if false_alarm_probability <= 0.5:
-            excess = slope * _poisson_sum_below(pulses, threshold) - false_alarm_probability
+            excess = slope * _scaled_poisson_sum_below(pulses, threshold) - false_alarm_probability
         else:
-            below = slope * _poisson_sum_from(pulses, threshold)
+            below = slope * _scaled_poisson_sum_from(pulses, threshold)
             excess = (1.0 - false_alarm_probability) - below
         step = excess / slope
         if not math.isfinite(step):
@@ -167,14 +167,14 @@ def _poisson_at(m: int, mean: float) -> float:
         return float(poisson(np.array([float(m)]), np.array([mean]))[0])
 
 
-def _poisson_sum_below(pulses: int, mean: float) -> float:
+def _scaled_poisson_sum_below(pulses: int, mean: float) -> float:
     """Return the sum of the Poisson terms 0 … pulses - 1, divided by the last one."""
     with np.errstate(under="ignore"):  # terms far below the last one are 0
         ratios = np.arange(pulses - 1, 0, -1, dtype=np.float64) / mean
         return math.fsum(np.cumprod(ratios).tolist()) + 1.0
 
 
-def _poisson_sum_from(pulses: int, mean: float) -> float:
+def _scaled_poisson_sum_from(pulses: int, mean: float) -> float:
     """Return the sum of the Poisson terms from `pulses` on, divided by the term pulses - 1."""
     count = int(40.0 + 40.0 * math.sqrt(pulses))
     with np.errstate(under="ignore"):  # terms far above are 0

@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike
 
 from components.arguments.checks import (
     broadcast_flat,
+    check_finite,
     check_not_negative,
-    finite,
-    positive,
+    check_positive,
     refuse,
     unflatten,
 )
@@ -57,8 +57,8 @@ def received_share(range_m: ArrayLike, *, prf_hz: float, pulse_width_s: float) -
         shut receives no noise either, and what is left of the pulse is matched. A filter matched to
         the whole pulse that goes on to hear noise has the square of the share.
     """
-    interval_s = 1.0 / float(positive("prf_hz", prf_hz))
-    width_s = float(positive("pulse_width_s", pulse_width_s))
+    interval_s = 1.0 / float(check_positive("prf_hz", prf_hz))
+    width_s = float(check_positive("pulse_width_s", pulse_width_s))
     refuse(
         "pulse_width_s", np.asarray(width_s), np.asarray(width_s > interval_s),
         f"be at most the pulse interval, {interval_s:g} s",
@@ -154,11 +154,11 @@ def count_clear_prfs(
         0 to the number of PRFs. One PRF sees (1 - 2 notch / blind speed) of all rates and, with
         `least_share` s, 1 - 2 s τ/T of all delays.
     """
-    positive("wavelength_m", wavelength_m)
+    check_positive("wavelength_m", wavelength_m)
     notch = float(check_not_negative("notch_m_s", notch_m_s))
     shape, (distance, rate) = broadcast_flat(
         range_m=check_not_negative("range_m", range_m),
-        range_rate_m_s=finite("range_rate_m_s", range_rate_m_s),
+        range_rate_m_s=check_finite("range_rate_m_s", range_rate_m_s),
     )
     count = np.zeros(distance.shape, dtype=np.int64)
     for prf_hz in prfs_hz:

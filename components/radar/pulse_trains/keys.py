@@ -49,7 +49,7 @@ class PulseTrainParameters(SensorParameters):
     )
 
     @model_validator(mode="after")
-    def _pulses(self) -> Self:
+    def _check_pulse_keys(self) -> Self:
         for key, value in (
             ("pulse_width_s", self.pulse_width_s),
             ("range_folds", self.range_folds),
@@ -63,14 +63,14 @@ class PulseTrainParameters(SensorParameters):
                 f"{max(self.prfs_hz):g} Hz, {1.0 / max(self.prfs_hz):.4g}"
             )
         if self.other_prfs_hz:
-            self._check_several()
+            self._check_several_prfs()
         elif self.prfs_needed is not None:
             raise ValueError(
                 f"prfs_needed is {self.prfs_needed} and other_prfs_hz is not given: of which PRFs?"
             )
         return self
 
-    def _check_several(self) -> None:
+    def _check_several_prfs(self) -> None:
         given = f"other_prfs_hz is {list(self.other_prfs_hz)}"
         if not self.range_folds:
             raise ValueError(f"{given} and range_folds is false: no range is ambiguous; set it")

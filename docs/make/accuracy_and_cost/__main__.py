@@ -22,7 +22,7 @@ from components.line_of_sight.error_map import (
     RADAR_DEG,
     ErrorMap,
     draw_error_map,
-    error_maps,
+    error_maps_of_earth_models,
 )
 from docs.make.accuracy_and_cost.answers import head as answers_head
 from docs.make.accuracy_and_cost.answers import reports, section
@@ -33,7 +33,7 @@ from dsa_des.record.recording import Recorder
 from dsa_des.record.sinks import ColumnSink
 from dsa_des.running.simulation import Simulation
 from dsa_des.scene.scene import Scene
-from dsa_des.studies.executors import default_workers
+from dsa_des.studies.executors import usable_processor_count
 from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 #: A pixel of the camera, which errors of direction are compared with.
@@ -137,7 +137,7 @@ def error_map_section(images: Path) -> str:
     with tempfile.TemporaryDirectory() as folder:
         drawn = {path.name: path for path in draw_error_map(Path(folder))}
         write_file(images / FIGURE, drawn[FIGURE].read_bytes())
-    maps = {found.model: found for found in error_maps(_LATITUDES_DEG, _RANGES_M)}
+    maps = {found.model: found for found in error_maps_of_earth_models(_LATITUDES_DEG, _RANGES_M)}
     lines = [
         "`dsa-des cost --map geometry`",
         "",
@@ -279,15 +279,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--encounter-says", default="a made-up crossing", help="what it is")
     parser.add_argument("--docs", type=Path, default=DOCS, help="folder to write to")
-    parser.add_argument("--workers", type=int, default=default_workers(), help="of the studies")
+    parser.add_argument(
+        "--workers", type=int, default=usable_processor_count(), help="of the studies"
+    )
     options = parser.parse_args(arguments)
     images: Path = options.docs / "images"
     images.mkdir(parents=True, exist_ok=True)
 
-    from dsa_des.commands.cost import comparison_of_all_reports, ladders_to_climb
-    from dsa_des.costs.chain import draw_chain, run_rung_combinations
+    from dsa_des.commands.cost import comparison_of_all_reports, ladders_to_run_and_notes
+    from dsa_des.costs.chain import draw_run_error_against_cost, run_rung_combinations
     from dsa_des.costs.climb import RungCost, measure_rungs
-    from dsa_des.costs.cost_report import draw_costs
+    from dsa_des.costs.cost_report import draw_error_against_cost
     from dsa_des.costs.variants import Variants
 
     compare = comparison_of_all_reports()
@@ -296,7 +298,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene: str, *sets: str, block: str | None = None, duration_s: object = None
     ) -> tuple[Variants, list[RungCost]]:
         variants = Variants(str(configs_folder() / scene), sets=sets, duration_s=duration_s)
-        climbs, _ = ladders_to_climb(variants, block, None)
+        climbs, _ = ladders_to_run_and_notes(variants, block, None)
         return variants, [
             cost
             for name, ladder in climbs
@@ -304,12 +306,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         ]
 
     variants, first = costs_of("first_light.toml")
-    draw_costs(images / "cost_first_light.png", variants.scene.title, first)
+    draw_error_against_cost(images / "cost_first_light.png", variants.scene.title, first)
     chain, picked = run_rung_combinations(variants, first, compare)
     label = compare.difference.label
-    draw_chain(images / "cost_chain.png", variants.scene.title, chain, label)
+    draw_run_error_against_cost(images / "cost_chain.png", variants.scene.title, chain, label)
     flown, second = costs_of("replay_daa.toml", f"blocks.traffic.file={options.encounter}")
-    draw_costs(images / "cost_encounter.png", options.encounter.stem, second)
+    draw_error_against_cost(images / "cost_encounter.png", options.encounter.stem, second)
     _, third = costs_of(*TRACKERS, block="tracker", duration_s="20")
     made = reports(options.workers)
     page = _PAGE.format(

@@ -74,7 +74,7 @@ def head(made: Sequence[AnswerReport], studies: Sequence[AskedStudy] = STUDIES) 
     lines = []
     for asked, report in zip(studies, made, strict=True):
         for name in report.verdicts:
-            said = report.sentences(name)
+            said = report.conclusion_sentences(name)
             decision = " ".join(said[1:3]).partition(" Front, cheapest first:")[0]
             lines.append(f"- **{asked.heading}**, `{name}`. {decision}")
     return "\n".join(lines)
@@ -94,7 +94,7 @@ def _tables(report: AnswerReport) -> list[str]:
         every = list(report.table_rows(result.name))
         rows = [row for row in every if row[-1] != "same"]
         used = [k for k in range(len(HEADS)) if any(row[k] for row in rows)]
-        lines += [f"**{report.title_of(result.name)}**", ""]
+        lines += [f"**{report.table_heading(result.name)}**", ""]
         lines.append(f"| {' | '.join(HEADS[k] for k in used)} |")
         lines.append("|---" * len(used) + "|")
         lines += [f"| {' | '.join(row[k] for k in used)} |" for row in rows]
@@ -103,7 +103,7 @@ def _tables(report: AnswerReport) -> list[str]:
             for row in every
             if row[-1] == "same"
         ]
-        said = beside_the_table(report.sentences(result.name), same)
+        said = beside_the_table(report.conclusion_sentences(result.name), same)
         lines += ["", *(f"{line}\n" for line in said)]
     return [*lines, *(f"{line}  " for line in report.notes_on_tables()), ""]
 

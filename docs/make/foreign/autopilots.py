@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import dsa_des
-from components.foreign.stand_in_autopilot import serve
+from components.foreign.stand_in_autopilot import answer_and_list_senders
 
 _CONFIGS = Path(__file__).parents[3] / "configs"
 _REPLICAS = 200
@@ -74,7 +74,7 @@ def main() -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
-    threading.Thread(target=serve, args=(port,), daemon=True).start()
+    threading.Thread(target=answer_and_list_senders, args=(port,), daemon=True).start()
     print("| | well clear lost | ratio | near mid-air collision | ratio |\n|---|---|---|---|---|")
     for name, (wires, blocks) in ways_out(port, next(iter(sys.argv[1:]), None)).items():
         print("| " + " | ".join([name, *row(wires, blocks)]) + " |", flush=True)

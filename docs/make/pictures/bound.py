@@ -44,7 +44,7 @@ class BoundedCamera(image.ImageCamera):
         at = 2.0 * (middle / scene.binned - corner)
         outlines = [at + (2.0 / scene.binned) * outline for outline in scene.outlines]
         fine = union_coverage(outlines, 2 * side, 2 * side, 2.0 * scene.smear)
-        spread, cv2 = 2.0 * self.p.blur_pixels / scene.binned, image.opencv()
+        spread, cv2 = 2.0 * self.p.blur_pixels / scene.binned, image.single_threaded_opencv()
         fine = cv2.GaussianBlur(fine, (0, 0), spread, borderType=cv2.BORDER_REPLICATE)
         return fine.reshape(side, 2, side, 2).mean(axis=(1, 3))
 

@@ -7,7 +7,7 @@ import numpy as np
 
 import dsa_des
 from components.arguments.units import FOOT_M
-from components.thesis.drawing import GREY, legend_below, panels
+from components.thesis.drawing import GREY, draw_legend_below, panels_written_as_png
 from dsa_des.block.mark import BLUE, GREEN, ORANGE, RED
 
 STUDY, FIGURE = "degas_sensors", "degas_sensors.png"
@@ -89,7 +89,7 @@ def _of(runs: Any, key: str) -> dict[str, Any]:
 
 def draw(path: Path, runs: Any) -> None:
     """Draw the distributions."""
-    with panels(path, 1, 3, width_in=9.6) as every:
+    with panels_written_as_png(path, 1, 3, width_in=9.6) as every:
         for axes, (column, name, factor, perfect) in zip(every, SEEN, strict=True):
             for key, (label, colour) in SENSORS.items():
                 values = np.sort(factor * _of(runs, key)[column])
@@ -99,7 +99,7 @@ def draw(path: Path, runs: Any) -> None:
             axes.axvline(perfect, color=GREY, linestyle="--", label="perfect surveillance")
             axes.set_xlabel(name)
         every[0].set_ylabel("share of runs")
-        legend_below(every[0])
+        draw_legend_below(every[0])
 
 
 def text(images: Path, runs: Any = None) -> str:

@@ -19,7 +19,7 @@ from components.formats.set_file import write_set
 from components.visual.acquisition import (
     VISUAL_RANGE_DEPTH,
     integrated_acquisition_rate,
-    probability_met_by_round,
+    search_round_look_probability,
 )
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.seen_in_time import Eyes, shares_unseen
@@ -63,7 +63,7 @@ def in_closed_form(speed_kt: float, looking: float, size_ft: float = SIZE_FT) ->
     """Return the probability to see an aircraft in time, of a search that comes round."""
     speed = speed_kt * KNOT_M_S
     shown_m = size_ft * FOOT_M / math.radians(SMALLEST_ARCMIN / 60.0)
-    return probability_met_by_round(
+    return search_round_look_probability(
         speed, from_m=shown_m, to_m=NEEDED_S * speed, round_s=ROUND_S, looking=looking
     )
 

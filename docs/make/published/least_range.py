@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from components.arguments.units import KNOT_M_S
-from components.thesis.drawing import GREY, panels
+from components.thesis.drawing import GREY, panels_written_as_png
 from docs.make.published.rows import PublishedRow, table
 from docs.make.published.turn_flights import (
     LeastRange,
@@ -257,7 +257,7 @@ def ratio_rows(courses: dict[int, GridCourses]) -> list[PublishedRow]:
 
 def _draw(path: Path, found: dict[int, list[LeastRange]]) -> None:
     published = published_ranges()
-    with panels(path, 1, 2, width_in=9.0, height_in=3.8) as (ranges, ratios):
+    with panels_written_as_png(path, 1, 2, width_in=9.0, height_in=3.8) as (ranges, ratios):
         for kt, colour in ((35, GREEN), (105, BLUE), (195, ORANGE)):
             theirs = [(a, r) for (v, a, c), r in sorted(published.items()) if v == kt and a > 0]
             ranges.plot(*zip(*theirs, strict=True), ".", color=GREY, markersize=1.5)

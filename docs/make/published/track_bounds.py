@@ -12,7 +12,7 @@ import numpy as np
 
 import dsa_des
 from components.arguments.units import FOOT_M, FOOT_PER_MINUTE_M_S, KNOT_M_S
-from components.thesis.drawing import panels
+from components.thesis.drawing import panels_written_as_png
 from dsa_des.block.mark import BLUE, GREEN, ORANGE
 
 TITLE = "Open trackers against DO-365's bounds"
@@ -91,7 +91,7 @@ def table(lines: Lines, tracker: str, sensor: str) -> str:
 
 def draw(lines: Lines, path: Path) -> None:
     """Draw the radar's quantiles over range beside the bounds."""
-    with panels(path, 1, 4, width_in=10.5, height_in=3.2) as axes:
+    with panels_written_as_png(path, 1, 4, width_in=10.5, height_in=3.2) as axes:
         for panel, (name, what, unit, bound) in zip(axes, BOUNDS["radar"], strict=True):
             for place, (tracker, colour) in enumerate(TRACKERS.items()):
                 some = [lines.get((tracker, "radar", f"{name}.{r}")) for r in RANGES_NMI]

@@ -9,8 +9,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from components.formats.csv_file import csv_columns
-from components.formats.daa_file import daa_columns
+from components.formats.csv_file import csv_column_descriptions
+from components.formats.daa_file import daa_column_descriptions
 from docs.make.reference.parameter_tables import MARK, ParameterTables, mark_changing
 from dsa_des.block.entry_points import entry_points_of
 from dsa_des.block.message import Column, Message
@@ -97,7 +97,7 @@ def page() -> str:
     parts += ["## Traffic files\n", "### Tables (`traffic.file`)\n"]
     names = ("quantity", "accepted names")
     unit = "unit unless the header says another"
-    parts.append(_table((*names, unit, "needed"), csv_columns()))
+    parts.append(_table((*names, unit, "needed"), csv_column_descriptions()))
     parts.append(
         "`position` holds latitude and longitude in one cell, `date` the day of a clock. Columns "
         "of readsb, FlightRadar24 and BaseStation are in ft, kt and ft/min unless the header says "
@@ -105,7 +105,9 @@ def page() -> str:
         "is not used; `check` says so. Files of other kinds: [Real traffic](real-traffic.md).\n"
     )
     parts += ["### DAIDALUS (`traffic.daa_file`, `.daa` and `.xyz`)\n"]
-    parts.append(_table((*names, "unit unless the row of units says another"), daa_columns()))
+    parts.append(
+        _table((*names, "unit unless the row of units says another"), daa_column_descriptions())
+    )
     return "\n".join(parts)
 
 

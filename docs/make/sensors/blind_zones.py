@@ -8,7 +8,7 @@ import numpy as np
 
 from components.arguments.units import SPEED_OF_LIGHT_M_S
 from components.radar.pulse_trains.ambiguity import count_clear_prfs
-from components.thesis.drawing import panels
+from components.thesis.drawing import panels_written_as_png
 from dsa_des.terminal.interruption import exit_plainly_on_signal
 
 FIGURE = "blind_zones.png"
@@ -40,7 +40,7 @@ def zones(cells: int) -> dict[str, np.ndarray]:
 def draw(file: Path) -> None:
     """Draw the zones, side by side."""
     blind = zones(1600)
-    with panels(file, 1, len(blind), sharey=True, height_in=3.2) as each:
+    with panels_written_as_png(file, 1, len(blind), sharey=True, height_in=3.2) as each:
         for axes, (title, zone) in zip(each, blind.items(), strict=True):
             extent = (-FASTEST_M_S, FASTEST_M_S, 0.0, FARTHEST_M / 1000.0)
             axes.imshow(

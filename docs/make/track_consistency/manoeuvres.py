@@ -18,7 +18,7 @@ import numpy as np
 import dsa_des
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_and_duration
-from components.metrics.true_states import states_in_frame
+from components.metrics.true_states import states_and_presence_in_frame
 from docs.make.track_consistency.cases import OWNSHIP, Case
 from docs.make.track_consistency.nees import tracks_of
 from docs.make.track_consistency.scenes import scene_of_case
@@ -98,7 +98,7 @@ def measured(
             n: part[n].to_numpy() for n in (*_STATE, *COVARIANCE.values(), "state_s", "time_s")
         }
         origin = np.stack([part[f"origin_{n}"].to_numpy() for n in ("lat_deg", "lon_deg", "alt_m")])
-        true, _ = states_in_frame(targets, columns["state_s"], origin)
+        true, _ = states_and_presence_in_frame(targets, columns["state_s"], origin)
         error = np.stack([columns[n] for n in _STATE]) - true  # (targets, 6, rows)
         spread = np.empty((len(columns["state_s"]), 6, 6))
         for (i, j), name in COVARIANCE.items():

@@ -10,7 +10,7 @@ import numpy as np
 
 from components.messages.state_tracks import COVARIANCE
 from components.metrics.separation import traffic_and_duration
-from components.metrics.true_states import states_in_frame
+from components.metrics.true_states import states_and_presence_in_frame
 from docs.make.track_consistency.cases import Case
 from docs.make.track_consistency.scenes import scenes_of
 from dsa_des.arrays.types import FloatArray
@@ -75,7 +75,7 @@ def _of_run(table: Any, targets: list[Any], within_m: float) -> FloatArray:
             continue
         part = {n: columns(n)[rows] for n in (*_STATE, *COVARIANCE.values(), "state_s")}
         origin = np.stack([columns(f"origin_{n}")[rows] for n in ("lat_deg", "lon_deg", "alt_m")])
-        known, _ = states_in_frame(targets, part["state_s"], origin)
+        known, _ = states_and_presence_in_frame(targets, part["state_s"], origin)
         error = np.stack([part[n] for n in _STATE]) - known
         # Where two meet, who flies on elsewhere is another one.
         ahead = error[:, :3] + _AHEAD_S * error[:, 3:]

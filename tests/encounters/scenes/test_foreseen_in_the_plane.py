@@ -64,13 +64,13 @@ def test_the_plane_and_the_flights_give_the_same(
     (tmp_path / "scene.toml").write_text(scene, encoding="utf-8")
     (tmp_path / "study.toml").write_text(STUDY.format(size=670.56), encoding="utf-8")
     asked: list[int] = []
-    exact = risk_metric.RiskRatios._nominal_events
+    exact = risk_metric.RiskRatios._nominal_flags_and_classes
 
     def counted(self: Any, group: Any) -> Any:
         asked.append(len(group))
         return exact(self, group)
 
-    monkeypatch.setattr(risk_metric.RiskRatios, "_nominal_events", counted)
+    monkeypatch.setattr(risk_metric.RiskRatios, "_nominal_flags_and_classes", counted)
     in_plane = foreseen(tmp_path)
     assert sum(asked) < 60, "few are asked of the flights"
     monkeypatch.setattr(risk_metric, "meetings_in_plane", lambda *_: None)
@@ -104,11 +104,11 @@ def test_a_set_of_many_gives_each_encounter_as_alone(tmp_path: Path) -> None:
         .parameters
         for n in (3, 11, 5)
     ]
-    together = ModelTraffic.choose(parameters)
+    together = ModelTraffic.choose_encounters(parameters)
     assert [int(of.numbers[index]) for of, index in together] == [3, 11, 5]
     assert len({id(of) for of, _ in together}) == 1
     for p, (of, index) in zip(parameters, together, strict=True):
-        ((alone, at),) = ModelTraffic.choose([p])
+        ((alone, at),) = ModelTraffic.choose_encounters([p])
         assert alone.weights[at] == of.weights[index]
         pair = encounter_flights(of, index, "euler"), encounter_flights(alone, at, "euler")
         for one, other in zip(*pair, strict=True):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from components.foreign.fmu.own_pose import ownship_columns
+from components.foreign.fmu.own_pose import ownship_motion_and_latest
 from components.messages.targets import TrafficStates
 from dsa_des.arrays.run_ticks import RunTicks
 from dsa_des.block.wake import Arrivals, Wake
@@ -27,7 +27,7 @@ def told(*ticks: int) -> Arrivals:
 def seen(ticks: list[int], held: dict, *arrivals: Arrivals) -> tuple[list[float], dict]:
     instants = RunTicks(np.zeros(len(ticks), dtype=np.int64), np.array(ticks))
     wake = Wake(instants, np.full(len(ticks), -1), 1, {}, {"messages": list(arrivals)})
-    found, after = ownship_columns(wake, "messages", held, moves=False)
+    found, after = ownship_motion_and_latest(wake, "messages", held, moves=False)
     return found[0].tolist(), after
 
 

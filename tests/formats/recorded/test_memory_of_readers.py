@@ -9,7 +9,7 @@ import recorded_files as write
 from components.flights import attitude, sampled_flight
 from components.formats import receiver_logs, recording
 from components.formats.recorded import autopilot_logs, xml_tracks
-from components.formats.recorded.known_kinds import record
+from components.formats.recorded.known_kinds import recording_of_file
 
 START = 1_717_243_200.0
 FEW, MANY = 60, 240
@@ -89,7 +89,7 @@ KINDS = {
 
 
 def read(path):
-    return record(path).flights(None)
+    return recording_of_file(path).flights(None)
 
 
 def test_samples_are_the_same_bits_whatever_the_blocks(tmp_path, monkeypatch):

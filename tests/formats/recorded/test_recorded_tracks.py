@@ -9,7 +9,7 @@ import zipfile
 import pytest
 import recorded_files as write
 
-from components.formats.recorded.known_kinds import record
+from components.formats.recorded.known_kinds import recording_of_file
 from components.formats.text_rows import TrafficFileError
 
 START = 1_717_243_200.0  # 2024-06-01 12:00 UTC
@@ -20,7 +20,7 @@ OTHER = [(START + 0.5 + k, 47.01, 8.01 + 0.0001 * k, 1200.0) for k in range(8)]
 def read(tmp_path, name, data, **options):
     path = tmp_path / name
     path.write_bytes(data)
-    return record(path, **options)
+    return recording_of_file(path, **options)
 
 
 def assert_flown(samples, fixes, deg=1e-9, up_m=1e-9):

@@ -10,10 +10,10 @@ import pyarrow.parquet as pq
 import pytest
 import recorded_files as write
 
-from components.formats.asterix_records import ADS_B, PLOTS, AsterixRecord, write_records
+from components.formats.asterix_records import ADS_B, PLOTS, AsterixRecord, encode_records
 from components.formats.measurement_file import read_measurements
 from components.formats.recorded import captures
-from components.formats.recorded.known_kinds import captured_asterix, record
+from components.formats.recorded.known_kinds import asterix_blocks_of_capture, recording_of_file
 from components.formats.text_rows import Problems, TrafficFileError
 
 START = 1_717_243_200
@@ -57,7 +57,7 @@ def as_parquet(tmp_path, rows, **columns) -> bytes:
 def read(tmp_path, name, data, **options):
     path = tmp_path / name
     path.write_bytes(data)
-    return record(path, **options)
+    return recording_of_file(path, **options)
 
 
 def test_columns_as_pandas_writes_them(tmp_path):
@@ -144,7 +144,7 @@ def test_units_of_autopilots_and_cells_of_several_lines(tmp_path):
 
 def adsb(times=range(5)) -> list[bytes]:
     return [
-        write_records([AsterixRecord(ADS_B, 43_200.0 + t, {
+        encode_records([AsterixRecord(ADS_B, 43_200.0 + t, {
             "number": 0x3C6444, "lat_deg": 47.0 + 0.001 * t, "lon_deg": 8.0,
             "flight_level_m": 1524.0,
         })])
@@ -170,7 +170,7 @@ def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
     """The same as from its data blocks alone; where it stands a scene says."""
     pytest.importorskip("asterix", reason="needs asterix")
     blocks = [
-        write_records([AsterixRecord(PLOTS, 100.0 + 4 * k, {
+        encode_records([AsterixRecord(PLOTS, 100.0 + 4 * k, {
             "sac": 1, "sic": 2, "range_m": 30_000.0 + 100 * k, "azimuth_deg": 40.0,
             "alt_m": 1524.0,
         })])
@@ -181,13 +181,13 @@ def test_plots_of_a_radar_are_read_out_of_a_capture(tmp_path):
     captured.write_bytes(write.pcap([(START + k, block) for k, block in enumerate(blocks)]))
     place = 47.0, 8.0, 500.0
     one = read_measurements(plain, None, place)
-    other = read_measurements(captured, None, place, captured_asterix(captured))
+    other = read_measurements(captured, None, place, asterix_blocks_of_capture(captured))
     for name, values in one.entries.items():
         np.testing.assert_array_equal(other.entries[name], values)
     assert other.entries["range_m"] == pytest.approx([30_000, 30_100, 30_200], abs=4)
-    assert captured_asterix(plain) is None
+    assert asterix_blocks_of_capture(plain) is None
     with pytest.raises(TrafficFileError, match=r"none of its 3 plots of radars \(048\) says whose"):
-        record(captured)
+        recording_of_file(captured)
 
 
 KINDS = {
@@ -249,13 +249,13 @@ def test_datagrams_of_every_link_are_taken_out_of_a_capture(magic: bytes) -> Non
         known = ethernet(udp_v4(b"known"))
         last = struct.pack(f"{order}4I", 9, 250, len(known), len(known)) + known
         if payload is not None:
-            found = captures.udp_payloads(Problems("a.pcap"), head + other)
+            found = captures.udp_times_and_payloads(Problems("a.pcap"), head + other)
             assert found == [(pytest.approx(7 + 500 * fraction_s), payload)]
             continue
         with pytest.raises(TrafficFileError, match=rf"no UDP .* packets are of link type {link}\)"):
-            captures.udp_payloads(Problems("a.pcap"), head + other)
+            captures.udp_times_and_payloads(Problems("a.pcap"), head + other)
         if link == 1:
-            found = captures.udp_payloads(Problems("a.pcap"), good + other + last)
+            found = captures.udp_times_and_payloads(Problems("a.pcap"), good + other + last)
             assert found == [(pytest.approx(9 + 250 * fraction_s), b"known")]
 
 
@@ -277,5 +277,5 @@ def test_where_a_capture_is_cut_off_is_said_as_a_whole() -> None:
          "packet 2: the block is damaged"),
     ):  # fmt: skip
         with pytest.raises(TrafficFileError) as error:
-            captures.udp_payloads(Problems("a.pcap"), data)
+            captures.udp_times_and_payloads(Problems("a.pcap"), data)
         assert str(error.value) == f"a.pcap: {said}"

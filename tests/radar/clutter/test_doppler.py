@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import quad
 
 from components.radar.doppler import FILTERS, MovingTargetFilter, folded_range_rate
-from components.radar.ground_clutter import platform_spread_m_s
+from components.radar.ground_clutter import platform_range_rate_spread_m_s
 
 PRF_HZ, WAVELENGTH_M = 5000.0, 0.03
 BLIND_M_S = 75.0
@@ -66,7 +66,7 @@ def test_a_bank_seeks_in_the_nearest_filter_outside_the_notch(pulses):
 def test_blind_speeds_are_multiples_of_half_a_wavelength_by_prf(kind):
     found = made(kind)
     assert found.blind_speed_m_s == pytest.approx(BLIND_M_S)
-    assert found.unambiguous_m_s == pytest.approx(BLIND_M_S / 2)
+    assert found.unambiguous_range_rate_m_s == pytest.approx(BLIND_M_S / 2)
     rates = np.linspace(0.0, BLIND_M_S, 301)
     here, _ = found.target_and_clutter_gains(rates)
     again, _ = found.target_and_clutter_gains(rates - 3 * BLIND_M_S)
@@ -100,12 +100,12 @@ def test_the_spread_of_a_moving_platform_is_that_of_its_beam():
     rate = -speed * np.cos(off + angle)
     mean = np.average(rate, weights=gain)
     expected = math.sqrt(np.average((rate - mean) ** 2, weights=gain))
-    found = platform_spread_m_s(speed, -speed * math.cos(off), beam)
+    found = platform_range_rate_spread_m_s(speed, -speed * math.cos(off), beam)
     assert found == pytest.approx(expected, rel=1e-3)
     # Abeam 0.6 V θ / λ in Hz (Skolnik, section 3.7).
-    abeam = 2.0 / WAVELENGTH_M * platform_spread_m_s(speed, 0.0, beam)
+    abeam = 2.0 / WAVELENGTH_M * platform_range_rate_spread_m_s(speed, 0.0, beam)
     assert abeam == pytest.approx(0.6 * speed * beam / WAVELENGTH_M, rel=2e-3)
-    assert platform_spread_m_s(speed, -speed, beam) == 0.0
+    assert platform_range_rate_spread_m_s(speed, -speed, beam) == 0.0
 
 
 def test_range_rates_fold():

@@ -14,7 +14,7 @@ from wired import chain, run, sensor
 import dsa_des
 from components.terrain.reflection import (
     reflection_coefficient,
-    specular_field_factor,
+    roughness_field_factor,
     two_ray_power_factor,
 )
 from dsa_des.running.simulation import Simulation
@@ -119,7 +119,7 @@ def test_fresnel_brewster_and_rayleigh():
     down = reflection_coefficient(math.pi / 2.0, 9.0 + 0j, "horizontal")
     assert down == pytest.approx((1.0 - 3.0) / (1.0 + 3.0))
     # Heights of λ / 8 sin ψ are rough by Rayleigh: phases a quarter of a turn apart.
-    rough = specular_field_factor(math.radians(30.0), 0.1 / 8.0 / 0.5, 0.1)
+    rough = roughness_field_factor(math.radians(30.0), 0.1 / 8.0 / 0.5, 0.1)
     assert rough == pytest.approx(math.exp(-((math.pi / 2.0) ** 2) / 2.0))
 
 

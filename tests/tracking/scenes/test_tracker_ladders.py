@@ -9,7 +9,12 @@ from wired import chain
 import dsa_des
 from components.track_fusion.covariance_intersection import RULE
 from components.tracking.ladder import FILTER, LADDERS, LATENESS
-from dsa_des.costs.replay import errors_against, errors_against_precise, replay_values, run_rung
+from dsa_des.costs.replay import (
+    error_spread_by_quantity,
+    errors_against_precise,
+    replay_values,
+    run_rung,
+)
 
 RADAR = {
     "type": "radar.range_boundary", "scan_rate_hz": 4, "range_km": 20.0, "errors": "stated",
@@ -69,7 +74,7 @@ def test_late_looks_that_are_worked_on_are_rows_of_their_own():
         found[mode] = replay_values(LATENESS, run, run)
     rows = {mode: int((~np.isnan(v["position"])).sum()) for mode, (_, v) in found.items()}
     assert rows["rerun"] > rows["drop"] > 0
-    spread = errors_against(LATENESS, found["drop"], found["rerun"])
+    spread = error_spread_by_quantity(LATENESS, found["drop"], found["rerun"])
     assert 0.0 < spread["position"].mean < 30.0
     own, said = errors_against_precise(LATENESS, run, found["rerun"])
     assert own["position"].mean == pytest.approx(np.nanmean(found["rerun"][1]["position"]))
@@ -101,9 +106,9 @@ def test_rules_of_fusion_differ_in_their_spread():
         spread = np.sqrt(sum(row[f"covariance_{i}{i}_m2"] for i in range(3)))
         assert values["spread"][at] == pytest.approx(spread, rel=1e-12)
     assert np.count_nonzero(~np.isnan(values["spread"])) == len(told)
-    same = errors_against(RULE, found["determinant"], found["determinant"])
+    same = error_spread_by_quantity(RULE, found["determinant"], found["determinant"])
     assert same["position"].maximum == same["spread"].maximum == 0.0
-    other = errors_against(RULE, found["independent"], found["determinant"])
+    other = error_spread_by_quantity(RULE, found["independent"], found["determinant"])
     assert other["position"].maximum > 0.1
     ratio = found["independent"][1]["spread"] / found["determinant"][1]["spread"]
     assert np.nanmax(ratio) <= 1.0 + 1e-9 and np.nanmin(ratio) < 0.9

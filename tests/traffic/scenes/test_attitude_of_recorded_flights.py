@@ -8,7 +8,7 @@ import pytest
 from wired import chain, rows, run, sensor
 
 from components.display.terminal import derived_attitude_lines
-from components.flights.attitude import attitude_from_path, fit_path
+from components.flights.attitude import attitude_from_path, fit_velocity_and_acceleration
 from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.traffic.recorded import derived_attitude_report
@@ -25,8 +25,8 @@ def test_no_sample_at_the_edge_of_a_window_is_lost_by_rounding(start_s):
     lon = -75 + 3e-5 * tenths + rng.normal(0, 1e-6, 600)
     alt = 1000 + rng.normal(0, 0.3, 600).cumsum()
     time_s = np.round(start_s + tenths / 10, 1) - start_s
-    velocity, acceleration = fit_path(time_s, lat, lon, alt)
-    exact, bend = fit_path(tenths.astype(float), lat, lon, alt, window_s=40.0)
+    velocity, acceleration = fit_velocity_and_acceleration(time_s, lat, lon, alt)
+    exact, bend = fit_velocity_and_acceleration(tenths.astype(float), lat, lon, alt, window_s=40.0)
     for found, expected in zip(velocity, exact, strict=True):
         np.testing.assert_allclose(found, 10 * expected, atol=1e-6)
     for found, expected in zip(acceleration, bend, strict=True):

@@ -257,7 +257,7 @@ def test_many_flights_together_by_differences_of_their_positions():
         own = SteeredFleet(ScriptedFleet([turning]))
         which = np.tile(np.arange(shape[1]), shape[0])
         times = np.repeat(time_s, shape[1])
-        found = FlownFlights(own, (-1,), targets, [Crabbing(wind)]).targets_at(which, times)
+        found = FlownFlights(own, (-1,), targets, [Crabbing(wind)]).target_states_at(which, times)
         found = found.reshape(shape)
         for place, flight in enumerate(targets):
             a, b = flight.at(time_s - 0.05), flight.at(time_s + 0.05)

@@ -56,7 +56,7 @@ class Instance:
         try:
             self.fmu.instantiate(loggingOn=False, **options)
         except Exception as error:
-            raise FmuFailure(f"it cannot be instantiated ({error}){self.words()}") from None
+            raise FmuFailure(f"it cannot be instantiated ({error}){self.last_log_text()}") from None
         self.component = c.c_void_p(self.fmu.component)
         self.saved: dict[int, Any] = {}
         self.slot = self.names = 0
@@ -105,13 +105,13 @@ class Instance:
     def _keep_log2(self, _: Any, __: Any, status: int, category: bytes, message: bytes) -> None:
         self.log.append(message.decode(errors="replace").strip())
 
-    def words(self) -> str:
+    def last_log_text(self) -> str:
         """Return the FMU's last log messages as text to be added to an error, empty without any."""
         return f": {' | '.join(list(self.log)[-3:])}" if self.log else ""
 
     def raise_failure(self, call: str, status: int) -> None:
         """Raise an `FmuFailure` for a call's bad status, with the FMU's last log messages."""
-        raise make_failure(call, status, self.words())
+        raise make_failure(call, status, self.last_log_text())
 
     # -- the life of an instance ---------------------------------------------------------------
 
@@ -162,7 +162,7 @@ class Instance:
         at = 0
         for group, _ in self.setters:
             group.values[:] = row[at : at + group.count]
-            group.exchange()
+            group.get_or_set_buffer()
             at += group.count
 
     def _set_inputs_and_tick(
@@ -172,16 +172,16 @@ class Instance:
         if self.spec["events"] and (due or (inputs is not None and self.spec["discrete"])):
             self.fmu.enterEventMode()
             self._process_events(inputs, due, raised)
-            self._leave_event_mode(tick, per_s)
+            self._update_clocks_enter_step_mode(tick, per_s)
         elif inputs is not None:
             self._put_inputs(inputs)
 
-    def _leave_event_mode(self, tick: int, per_s: int) -> None:
+    def _update_clocks_enter_step_mode(self, tick: int, per_s: int) -> None:
         self.clocks.update_pending_ticks(tick, per_s)
         self.fmu.enterStepMode()
 
     def step(self, start_s: float, end_s: float, raised: Any = None) -> bool:
-        """Advance to the next communication point; return whether the FMU did not end before.
+        """Advance to the next communication point; return False if the FMU ended before it.
 
         Events on the way are handled. It may ask to end before, or there (`ended`).
         """
@@ -212,7 +212,7 @@ class Instance:
             return
         self.fmu.enterEventMode()
         self._process_events(raised=raised)
-        self._leave_event_mode(round(now_s * self.per_s), self.per_s)
+        self._update_clocks_enter_step_mode(round(now_s * self.per_s), self.per_s)
 
     def _step_fmi2(self, start_s: float, end_s: float) -> bool:
         status = self._do_step(self.component, start_s, end_s - start_s, self.only_forward)
@@ -277,7 +277,7 @@ class Instance:
         raised = np.zeros((count, len(self.spec["raised"])))
         places, at = [], 0
         for group in self.numbers:
-            places.append((group.exchange, group.values, slice(at, at + group.count)))
+            places.append((group.get_or_set_buffer, group.values, slice(at, at + group.count)))
             at += group.count
         wide = [
             (group.values, place)
@@ -309,7 +309,7 @@ class Instance:
                         else ()
                     )
                     self._process_events(None, due_now, raised[row])
-                    self._leave_event_mode(tick, per_s)
+                    self._update_clocks_enter_step_mode(tick, per_s)
             elif clocked:
                 if not self._step_to(self.tick, tick, per_s, raised[row]):
                     done = row
@@ -336,8 +336,8 @@ class Instance:
                     exact[row, place.start + element] = str(values[element])
             if self.texts:
                 for group in self.texts:
-                    group.exchange()
-                texts.append([word for group in self.texts for word in group.words()])
+                    group.get_or_set_buffer()
+                texts.append([word for group in self.texts for word in group.read_texts()])
         slot = self.save() if request["save"] else self.slot
         return {
             "numbers": numbers,

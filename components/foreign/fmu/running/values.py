@@ -62,7 +62,7 @@ class ValueGroup:
         head = [fmu.component, self.references, c.c_size_t(len(references))]
         self._arguments = (*head, *middle, self.buffer, *tail)
 
-    def exchange(self) -> None:
+    def get_or_set_buffer(self) -> None:
         """Call the FMU's Get or Set, which fills the buffer or takes the values from it."""
         status = self._function(*self._arguments)
         if status > 1:
@@ -80,9 +80,9 @@ class ValueGroup:
                 self.buffer[place] = value.encode()
         else:
             self.buffer[:] = values
-        self.exchange()
+        self.get_or_set_buffer()
 
-    def words(self) -> list[str]:
+    def read_texts(self) -> list[str]:
         """Return the texts that were read, bytes as hexadecimal digits."""
         if self.kind == "Binary":
             return [c.string_at(p, n).hex() for p, n in zip(self.buffer, self.sizes, strict=True)]

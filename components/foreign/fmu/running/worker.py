@@ -17,7 +17,7 @@ from components.foreign.fmu.running.values import FmuFailure
 _MOST_WORDS = 1_000_000
 
 
-def serve(folder: str) -> None:
+def answer_requests_on_stdin(folder: str) -> None:
     """Answer requests on standard input to its end, then exit; ``folder`` is the process's own."""
     requests = os.fdopen(os.dup(0), "rb")
     answers = os.fdopen(os.dup(1), "wb")
@@ -47,5 +47,5 @@ def _answer(
         words = str(error) or type(error).__name__
         if not isinstance(error, FmuFailure):
             instance = instances.get(number)
-            words += "" if instance is None else instance.words()
+            words += "" if instance is None else instance.last_log_text()
         return {"failed": words, "at": request.get("at"), "opening": request["do"] == "open"}
