@@ -176,14 +176,17 @@ class RunTicks:
 
 
 def _is_same_run(parts: Sequence[RunTicks]) -> bool:
-    """Return whether all parts' instants, sorted in each, are of one and the same run."""
+    """Return whether all parts' instants, in any order, are of one and the same run."""
     for part in parts:
         if part.run.base is not _ZERO:
             break
     else:
         return True
     filled = [part.run for part in parts if len(part)]
-    return not filled or all(run[0] == filled[0][0] == run[-1] for run in filled)
+    # Mostly they are sorted, so that both ends tell.
+    return not filled or all(
+        run[0] == filled[0][0] == run[-1] and bool((run == run[0]).all()) for run in filled
+    )
 
 
 def _sortable_keys_and_tick_bits(*parts: RunTicks) -> tuple[list[IntArray], int]:

@@ -81,7 +81,7 @@ class Session:
                 self._stands.clear()
                 return False
             time_s, _, received = control._now
-            picture = control.scope.picture(time_s, received)
+            picture = control.scope.page_content(time_s, received)
             self._reached = self._reached or bool(self._until({"t": time_s, **picture}))
             if self._reached and not self._stands.is_set():
                 # Pages get this very picture, whatever they had before.

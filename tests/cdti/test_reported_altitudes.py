@@ -20,11 +20,11 @@ def test_altitude_and_climb_of_who_reports_them(qnh_hpa):
         tracker={"type": "tracking.stub"}, weather={"qnh_hpa": qnh_hpa},
     )  # fmt: skip
     scope, recorded = displayed(scene)
-    found = {scope.name_of(row[0]): row for row in scope.picture(12.2)["contacts"]}
+    found = {scope.name_of(row[0]): row for row in scope.page_content(12.2)["contacts"]}
     last = [row for row in recorded["detections"] if row["block"] == "tcas"][-1]
     # What the own altimeter reads, as linear as below 11 km.
     share = (qnh_hpa / 1013.25) ** 0.190263
-    own_alt_m = 288.15 / 0.0065 * (1 - share) + share * scope.picture(12.2)["own"]["alt"]
+    own_alt_m = 288.15 / 0.0065 * (1 - share) + share * scope.page_content(12.2)["own"]["alt"]
     assert last["target"] == "TRF3"
     assert found["TRF3"][3] == pytest.approx(last["reported_alt_m"] - own_alt_m, abs=0.1)
     assert found["TRF3"][8] == pytest.approx(4.0, abs=25.0 * 0.3048 / 5.0)

@@ -31,7 +31,7 @@ def served(monkeypatch):
 
 def page_of(server, admission):
     """What a browser is answered, or nothing while there is no room."""
-    host, port = server.authority.split(":")
+    host, port = server.host_and_port.split(":")
     with socket.create_connection((host, int(port)), timeout=WAIT_S) as browser:
         browser.sendall(f"GET /?token={admission.token} HTTP/1.1\r\nHost: {host}:{port}\r\n"
                         "Connection: keep-alive\r\n\r\n".encode())  # fmt: skip
@@ -42,7 +42,7 @@ def page_of(server, admission):
 
 
 def flood(server, count):
-    host, port = server.authority.split(":")
+    host, port = server.host_and_port.split(":")
     return [socket.create_connection((host, int(port)), timeout=WAIT_S) for _ in range(count)]
 
 
@@ -61,7 +61,7 @@ def test_connections_beyond_the_limit_are_dropped_and_places_come_back(served, c
 def test_a_flood_beyond_the_limit_of_open_files_is_one_line(served, capfd):
     """The limit counts the clients of this process too: they are opened before it is lowered."""
     server, admission, said = served
-    host, port = server.authority.split(":")
+    host, port = server.host_and_port.split(":")
     clients = [socket.socket() for _ in range(40)]
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (clients[-1].fileno() + 5, hard))

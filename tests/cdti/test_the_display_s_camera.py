@@ -166,7 +166,7 @@ def test_a_camera_that_renders_shows_the_patch_that_it_searched():
         fusion={"type": "fusion.pick_best"},
     )  # fmt: skip
     scope, recorded = displayed(scene)
-    picture = scope.picture(1.0)
+    picture = scope.page_content(1.0)
     shown = scope.camera_picture(picture, 1.0, picture["contacts"][0][0])
     patch = np.array(shown["patch"])
     assert shown["contrast"] is None

@@ -78,7 +78,7 @@ def away(name, seen_s, time_s=DURATION_S):
 
 def test_contacts_are_where_their_targets_were_and_fly_as_they_do(shown):
     scope, _, contact = shown
-    picture = scope.picture(DURATION_S)
+    picture = scope.page_content(DURATION_S)
     own = picture["own"]
     assert own["alt"] == pytest.approx(2400.0 + 3.0 * 8.2, abs=1.0)
     assert (own["speed"], own["climb"]) == pytest.approx((70.0, 3.0), abs=0.2)
@@ -102,7 +102,7 @@ def test_contacts_are_where_their_targets_were_and_fly_as_they_do(shown):
 
 def test_alerts_are_those_of_their_targets_the_most_urgent_first(shown):
     scope, recorded, contact = shown
-    alerts = scope.picture(DURATION_S)["alerts"]
+    alerts = scope.page_content(DURATION_S)["alerts"]
     assert [one["target"] for one in alerts] == [contact[name] for name in ALERTING]
     assert alerts[0]["level"] > alerts[1]["level"] > 0
     for name, one in zip(ALERTING, alerts, strict=True):
@@ -121,7 +121,7 @@ def test_alerts_are_those_of_their_targets_the_most_urgent_first(shown):
 def test_the_area_of_a_loss_begins_where_a_target_comes_near(shown):
     """Each of its directions flown straight, from where both were when the alerting looked."""
     scope, _, _ = shown
-    area = [row for row in scope.picture(DURATION_S)["area"] if row[1] > 0.0]
+    area = [row for row in scope.page_content(DURATION_S)["area"] if row[1] > 0.0]
     assert len(area) > 20
     for degrees, near, far in area:
         assert near < far
@@ -140,22 +140,22 @@ def test_bands_are_shown_in_degrees_and_m_until_they_are_old(shown):
         ends = [round(shown_as(row[f"{end}_{unit}"]), 1) for end in ("low", "high")]
         if row["time_s"] == 8.0:
             wanted[row["band"]].append([*ends, row["region"]])
-    assert all(wanted.values()) and scope.picture(DURATION_S)["bands"] == wanted
-    assert not any(scope.picture(8.0 + 1.6)["bands"].values())
+    assert all(wanted.values()) and scope.page_content(DURATION_S)["bands"] == wanted
+    assert not any(scope.page_content(8.0 + 1.6)["bands"].values())
 
 
 def test_what_was_heard_by_an_instant_is_shown_whatever_comes_later(shown):
     scope, _, _ = shown
-    received, before = scope.received_so_far(), scope.picture(DURATION_S)
+    received, before = scope.received_so_far(), scope.page_content(DURATION_S)
     late = copy(scope)
     late._contacts, late._alerts, late._bands = None, None, None
-    assert late.picture(DURATION_S)["contacts"] == [] != before["contacts"]
-    assert late.picture(DURATION_S, received) == before
+    assert late.page_content(DURATION_S)["contacts"] == [] != before["contacts"]
+    assert late.page_content(DURATION_S, received) == before
 
 
 def test_the_display_says_where_a_command_leads_and_of_which_alert_a_contact_is(shown):
     scope, recorded, contact = shown
-    own = scope.picture(DURATION_S)["own"]
+    own = scope.page_content(DURATION_S)["own"]
     assert scope.commanded_value("turn", -60.0) == pytest.approx(
         (own["heading"] - 60.0) % 360.0, abs=0.06
     )
@@ -175,7 +175,7 @@ def test_where_sensors_look_is_said_from_the_nose(shown):
 
 def test_the_camera_s_picture_is_of_the_chosen_contact(shown):
     scope, recorded, contact = shown
-    picture = scope.picture(DURATION_S)
+    picture = scope.page_content(DURATION_S)
     for chosen in (*contact.values(), -1):
         name = next((n for n, c in contact.items() if c == chosen), "closing")
         rows = [r for r in recorded["detections"] if r["block"] == "camera" and r["target"] == name]
@@ -195,7 +195,7 @@ def test_a_sensor_that_falls_silent_is_said_to_be_out():
     out = {}
 
     def look(scope, time_s):
-        out[round(time_s, 3)] = scope.picture(time_s)["out"]
+        out[round(time_s, 3)] = scope.page_content(time_s)["out"]
 
     scene = chain(sensors, targets=TARGETS.values(), duration_s=9, changes=[off])
     displayed(scene, look, window=1)

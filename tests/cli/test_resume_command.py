@@ -101,7 +101,9 @@ def test_the_printed_command_continues(
     assert not Path("pwned").exists()
 
 
-@pytest.mark.parametrize("where", ["run_study", "report_finished_study", "StudyFolder.open"])
+@pytest.mark.parametrize(
+    "where", ["run_study", "write_and_print_finished_study", "StudyFolder.open"]
+)
 def test_ctrl_c_is_130_wherever_it_comes(
     small: Path, monkeypatch: pytest.MonkeyPatch, where: str
 ) -> None:

@@ -24,8 +24,8 @@ _ROOT = Path(__file__).parents[3]
 _WORKER = """
 import sys
 sys.path.append(sys.argv[1])
-from components.foreign.fmu.running.worker import serve
-serve(sys.argv[2])
+from components.foreign.fmu.running.worker import answer_requests_on_stdin
+answer_requests_on_stdin(sys.argv[2])
 """
 _LOOK_S = 0.05
 

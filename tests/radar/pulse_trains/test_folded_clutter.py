@@ -210,7 +210,7 @@ class Beside(SimpleNamespace):
     def __len__(self):
         return 1
 
-    def of_row(self, name):
+    def field_at_rows(self, name):
         return np.array([900.0])
 
 
