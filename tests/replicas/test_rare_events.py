@@ -11,6 +11,7 @@ import pytest
 from click.testing import CliRunner
 from wired import head_on_loop
 
+from components.metrics.flown_flights import FlownMetric
 from dsa_des.cli import main
 from dsa_des.errors import SceneError
 from dsa_des.files.toml_files import to_toml
@@ -56,6 +57,17 @@ def test_levels_are_reached_by_a_fifth_of_the_runs_of_a_stage():
     steps = -np.diff([LAST, *levels])
     # 0.6^3 = 0.216 is the least power that is a fifth.
     assert set(steps[:-1]) <= {2, 3} and steps.mean() > 2.4
+
+
+def test_levels_of_separation_lead_to_the_event_where_the_last_step_is_the_steepest():
+    """All 20 s are within 9 % of the event: of 3.7e-5 in one step no pilot has a run."""
+
+    def last_step(runs, of, levels):
+        to_go_s = np.floor(8.0 * LAST * np.log2(levels) + 1e-9)
+        return chain(runs, of, np.minimum(to_go_s, LAST).tolist())
+
+    levels = find_levels(roots(0, 400), 5, FlownMetric.scores["separation"], last_step)
+    assert levels == tuple(2.0 ** (np.arange(4, -1, -1) / 32.0))
 
 
 def of_many(repetitions):
