@@ -7,14 +7,10 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from itertools import chain
-from os import PathLike
-from pathlib import Path
 
 import numpy as np
 
-from components.formats.receiver_logs import UNKNOWN_JSON, parse_receiver_log
 from components.formats.recording import Recording
-from components.formats.reports import build_recording
 from components.formats.sample_columns import (
     VELOCITIES,
     Altitude,
@@ -32,14 +28,10 @@ from components.formats.sample_columns import (
 from components.formats.sample_table import SampleTable
 from components.formats.text_rows import (
     Problems,
-    TrafficFile,
     did_you_mean,
-    iterate_lines,
     quoted_rows,
-    read_content,
     shown_columns,
     strip_frame,
-    text_of,
 )
 
 _GEOMETRIC = ("geoaltitude", "altgeom", "geomaltitude", "geometricaltitude", "gnssaltitude")
@@ -108,36 +100,6 @@ _FEW_HEIGHTS = 5
 _OF_FAMILIES = {"alt": "ft", "alt instead": "ft", "gs": "kt", "vs": "ft/min"}
 
 
-def read_csv(
-    path: str | PathLike[str], ownship: str | None = None, altitude: Altitude | None = None
-) -> TrafficFile:
-    """Read a CSV file with columns for time, id, latitude, longitude and altitude, or a log.
-
-    Logs are those that `components.formats.receiver_logs` knows; either may be packed (gzip). A
-    table is separated by commas, semicolons, tabs or blanks; cells may be quoted. Header names are
-    matched without regard to case, blanks and underscores, and may carry their unit: ``alt_ft``,
-    ``Altitude (ft)``, ``time [ms]``; without one they are in seconds, degrees, metres, m/s, but for
-    tables with columns that only readsb, FlightRadar24 or BaseStation write, which are in feet,
-    knots and feet per minute. Time is a number or ISO 8601 (UTC unless it says otherwise). Latitude
-    and longitude may stand in one cell. Rows without a time or a position are left out; heading,
-    pitch, roll and velocity are used for aircraft where they have no gaps. One name of several
-    aircraft that no one could be is told apart (`components.formats.recording.rename_duplicates`).
-    With `altitude` the column of that kind is read, else the one whose name comes first. The
-    ownship is the first aircraft unless its id is given; all that is wrong is one
-    `TrafficFileError`.
-    """
-    problems = Problems(str(path))
-    data = read_content(Path(path), problems)
-    log = parse_receiver_log(problems, data)
-    if log is not None:
-        return build_recording(problems, log, ownship, altitude).flights()
-    if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
-        problems.fail(UNKNOWN_JSON)
-    lines = iterate_lines(text_of(data, problems))
-    del data  # of many rows it is not held beside their samples
-    return recording_of_table(problems, lines, ownship, altitude).flights()
-
-
 def recording_of_table(
     problems: Problems,
     lines: Iterator[tuple[int, str]],
@@ -147,6 +109,18 @@ def recording_of_table(
 ) -> Recording:
     """Return a `Recording` of the aircraft in a table, at least two, or with ``stem`` at least one,
     which is called so if no column names it.
+
+    A table is separated by commas, semicolons, tabs or blanks; cells may be quoted. Header names
+    are matched without regard to case, blanks and underscores, and may carry their unit:
+    ``alt_ft``, ``Altitude (ft)``, ``time [ms]``; without one they are in seconds, degrees, metres,
+    m/s, but for tables with columns that only readsb, FlightRadar24 or BaseStation write, which are
+    in feet, knots and feet per minute. Time is a number or ISO 8601 (UTC unless it says otherwise).
+    Latitude and longitude may stand in one cell. Rows without a time or a position are left out;
+    heading, pitch, roll and velocity are used for aircraft where they have no gaps. One name of
+    several aircraft that no one could be is told apart
+    (`components.formats.recording.rename_duplicates`). With `altitude` the column of that kind is
+    read, else the one whose name comes first. The ownship is the first aircraft unless its id is
+    given; all that is wrong is one `TrafficFileError`.
     """
     (header_line, header_text), body = _header_and_rows(problems, strip_frame(lines))
     header_text = header_text.lstrip("#").strip(" ")

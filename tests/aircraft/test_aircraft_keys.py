@@ -10,12 +10,12 @@ import pyarrow.parquet as pq
 import pymap3d
 import pytest
 from covering import covers
+from recorded_files import read_csv
 from wired import Row, chain, decided, rows, run, sensor
 
 import dsa_des
 from components.encounters.encounter_traffic import MadeTogether
 from components.formats.asterix_records import ADS_B, AsterixRecord, encode_records
-from components.formats.csv_file import read_csv
 from components.formats.set_file import read_set
 from dsa_des.running.reports import notes_of_scene
 from dsa_des.running.simulation import Simulation

@@ -4,8 +4,8 @@ import json
 
 import numpy as np
 import pytest
+from recorded_files import read_csv
 
-from components.formats.csv_file import read_csv
 from components.formats.recorded import known_kinds
 from components.formats.text_rows import TrafficFileError
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recorded_files import read_csv
 
 import dsa_des
-from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.formats.recorded import known_kinds
 from components.formats.text_rows import TrafficFileError
@@ -152,7 +152,7 @@ def test_openskys_states_are_in_metres_at_the_times_of_their_positions(tmp_path)
     assert np.ravel(file.ownship.velocity_enu_mps) == pytest.approx([0.0, -50.0, -2.0], abs=1e-9)
     rows = [state("a1", 47.0), [*state("b2", 47.1)[:1], None, *state("b2", 47.1)[2:]]]
     content = {"time": 1700000000, "states": rows}
-    assert read(tmp_path, content, ownship="Ca1").ownship.name == "a1"
+    assert read(tmp_path, content, ownship="a1").ownship.name == "a1"
     with pytest.raises(TrafficFileError, match="None"):
         read(tmp_path, content, ownship="None")
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from recorded_files import read_csv
 
-from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa, read_daa_samples
 from components.formats.recording import subtract_start
 from components.formats.text_rows import TrafficFileError

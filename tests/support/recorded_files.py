@@ -207,3 +207,13 @@ def assert_refused_or_whole(path: Path, whole: bytes) -> None:
         for one in file.aircraft:
             states = one.at(one.sample_times_s).arrays()
             assert all(np.isfinite(values).all() for values in states)
+
+
+def read_csv(path, ownship=None, altitude=None):
+    """Return the flights of a file of any known kind."""
+    recording = recording_of_file(Path(path), altitude)
+    if ownship is not None:
+        calls = recording.callsigns
+        first = next(n for n in recording.samples if ownship in (n, calls.get(n)))
+        recording.samples = {first: recording.samples.pop(first), **recording.samples}
+    return recording.flights()
