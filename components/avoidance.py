@@ -146,9 +146,7 @@ class TurnOut(Component):
         return self.p.address if port == "told" else None
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return, under its message, how often in each run a manoeuvre was needed but none led
-        clear.
-        """
+        """Return by message how often in each run a manoeuvre was needed but none led clear."""
         return {"no change leads clear and the ownship is left alone": self._stuck}
 
     def warnings(self) -> list[str]:
@@ -242,15 +240,11 @@ class TurnOut(Component):
         return sorted(last.items())
 
     def _compatible_side(self, side: int) -> int:
-        """Return the side compatible with another aircraft's choice: the same for turns, the
-        opposite for climbs and descents.
-        """
+        """Return the side compatible with another's choice: the same for turns, else opposite."""
         return side if self.p.manoeuvre == "turn" else -side
 
     def _renewed_own_side(self, run: int, tick: int) -> int:
-        """Return the side chosen in the present conflict and note that it holds on from now; 0 if
-        none.
-        """
+        """Return the side chosen in this conflict, or 0, and note that it holds on from now."""
         at, side = self._chosen.get(run, (-1, 0))
         if not side or tick - at > int(self.p.heeds_s * self.context.ticks_per_s):
             return 0
@@ -262,9 +256,7 @@ class TurnOut(Component):
         return tick >= self._free_from.get(run, 0)
 
     def _must_give_way(self, run: int, tick: int) -> bool:
-        """Return whether an aircraft of lower address has chosen a side incompatible with one's
-        own.
-        """
+        """Return whether an aircraft of lower address has chosen an incompatible side."""
         mine = self._renewed_own_side(run, tick) if self.p.address is not None else 0
         first = [
             side for a, side in self._find_valid_choices(run, tick) if a < (self.p.address or 0)
@@ -272,8 +264,7 @@ class TurnOut(Component):
         return bool(mine and first and self._compatible_side(first[0]) != mine)
 
     def _choose_change(self, run: int, tick: int, changes: tuple[float, float]) -> float | None:
-        """Return the change to fly, or None: one compatible with other aircraft's choices if they
-        have any, else the smaller of the two `changes`.
+        """Return the change to fly: one compatible with others' choices, else the smaller, or None.
 
         Without a way there it is free, but not before its time.
         """

@@ -334,8 +334,7 @@ def merge_replica_rosters(
     aircraft: Sequence[tuple[str, Aircraft]],
     own: Sequence[tuple[str, Aircraft]] = (),
 ) -> Roster | None:
-    """Return one roster for the aircraft of all replicas, or None where they differ in more than
-    radar cross-section and equipage.
+    """Return one roster for all replicas' aircraft, or None if more than RCS and equipage differ.
 
     Radar cross-sections and equipage may differ: how far a sensor looks, and which physics it has,
     does not rest on them. Whatever else differs may decide how far a sensor looks. The `own` ones
@@ -360,9 +359,7 @@ def merge_replica_rosters(
 
 
 def _is_equal_if_mergeable(one: tuple[str, Aircraft], other: tuple[str, Aircraft]) -> bool | None:
-    """Return True for equal aircraft, False where they differ in `_MAY_DIFFER` fields only, None
-    where one roster cannot hold both.
-    """
+    """Return True if equal, False if only `_MAY_DIFFER` fields differ, None if not mergeable."""
     if one[0] != other[0]:
         return None
     if _has_equal_fields(one[1], other[1]):

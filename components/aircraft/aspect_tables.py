@@ -49,8 +49,7 @@ def dbsm_to_m2(rcs_dbsm: ArrayLike) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class RcsTable:
-    """An RCS (elevations, azimuths), dBsm, over the direction of the radar in the target's body
-    axes.
+    """An RCS (elevations, azimuths), dBsm, over the radar's direction in the target's body axes.
 
     Azimuths rise from 0 to below 360, elevations within [-90, 90]; spacing may vary. Interpolation
     is bilinear in dB; azimuth wraps, elevation is held beyond the outermost nodes. ValueError says
@@ -157,7 +156,9 @@ def _interpolate(
     azimuth_rad: ArrayLike,
     elevation_rad: ArrayLike,
 ) -> Any:
-    """Return the values of a table at directions, bilinear between its nodes."""
+    """Return the values of a table (elevations `levels`, azimuths `nodes_deg`, both in degrees) at
+    directions, bilinear; azimuth wraps, elevation is held at the outermost levels.
+    """
     shape, (azimuth, elevation) = broadcast_flat(
         azimuth_rad=check_finite("azimuth_rad", azimuth_rad),
         elevation_rad=check_finite("elevation_rad", elevation_rad),
@@ -205,9 +206,7 @@ def _convert_and_check_grid(table: Any, values: str) -> None:
 def _grid_from_nodes(
     az_deg: ArrayLike, el_deg: ArrayLike, values: ArrayLike, name: str
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return sorted azimuths, sorted elevations and values (elevations, azimuths) of nodes listed
-    in any order; raise ValueError for a hole.
-    """
+    """Return sorted azimuths, elevations and values (elevations, azimuths); ValueError on holes."""
     columns = [
         check_finite(column, given).reshape(-1)
         for column, given in (("az_deg", az_deg), ("el_deg", el_deg), (name, values))
@@ -297,9 +296,7 @@ def _row_values(
     columns: Sequence[int],
     quantities: Sequence[str],
 ) -> list[float]:
-    """Return the numbers in the given columns of a row; ValueError for one that is missing, no
-    number or absurdly large for its unit.
-    """
+    """Return numbers in columns of a row; ValueError for one missing, not a number or absurd."""
     values = []
     for column, quantity in zip(columns, quantities, strict=True):
         try:

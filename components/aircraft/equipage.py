@@ -114,9 +114,7 @@ class AdsBEquipage(Parameters):
 
 
 class EquipageShares(Parameters):
-    """Shares (0 to 1) of a fleet's aircraft that keep the Mode S, Mode C and ADS-B of their type;
-    drawn for each aircraft by its name.
-    """
+    """Shares (0 to 1) of aircraft that keep their type's Mode S, Mode C, ADS-B; drawn by name."""
 
     mode_s: float = Field(
         default=1.0,
@@ -215,9 +213,7 @@ class Equipage:
 def draw_equipage(
     names: Sequence[str], aircraft: Sequence[Any], shares: EquipageShares, stream: Any
 ) -> list[Any]:
-    """Return copies of the aircraft that keep Mode S, Mode C and ADS-B each with the probability of
-    its share, drawn by their names.
-    """
+    """Return copies of aircraft that keep Mode S, Mode C, ADS-B by share, drawn by their names."""
     keys, of_kind = target_keys(tuple(names)), dict[Any, Any]()
     kept = [
         stream.uniform(keys, np.int64(0), draw) < share

@@ -43,9 +43,7 @@ class KnownTraffic:
         return self._asked or any(view.is_envelope_used for view in self._views.values())
 
     def envelope(self, reach_m: float, lasts_s: float) -> Any:
-        """Return bounds on where targets can be, for a sensor's range in m and the seconds one look
-        of it lasts; None if unknown.
-        """
+        """Return where targets can be, for a range in m and look time in s; None if unknown."""
         if self._envelope is None:  # of no replica
             return None
         self._asked = True

@@ -29,9 +29,7 @@ _FIELDS: dict[str, Callable[[Thresholds], float]] = {
 
 
 class TableKeys:
-    """Collects the keys by which a file writes out the table of a TCAS detector: miss-distance
-    filter, altitude levels and sizes.
-    """
+    """Collects a written-out TCAS table's keys: miss-distance filter, altitude levels and sizes."""
 
     def __init__(self) -> None:
         self._filter: tuple[str, bool] | None = None

@@ -82,9 +82,7 @@ def write_alert_files(
 
 
 def _list_encounter_files(encounters: tuple[str, ...]) -> tuple[list[Path], bool]:
-    """Return the encounter files that are named or lie in named folders, and whether outputs must
-    be folders as there may be several.
-    """
+    """Return encounter files, named or in named folders, and whether outputs must be folders."""
     result: list[Path] = []
     several = len(encounters) > 1
     for text in encounters:

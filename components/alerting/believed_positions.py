@@ -21,9 +21,7 @@ _SHORTEST_S = 1e-6
 
 
 class BelievedFlights(NamedTuple):
-    """Relative flights (ownship less target) that alerts are computed from: a row per scan and a
-    column per target, or a row per track.
-    """
+    """Relative flights (own less target): row per scan, column per target, or a row per track."""
 
     known: BoolArray  # (rows, columns)
     # Six of (rows, columns): east, north, up in m and their rates in m/s, ownship less target.
@@ -53,9 +51,7 @@ class BelievedPositions:
         self._rangeless, self._unmoving = np.zeros((2, 2, 0), dtype=np.int64)
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return cause → (2, runs) counts: how often targets could not be judged for it, and of how
-        many cases.
-        """
+        """Return cause → (2, runs) counts: targets that could not be judged for it, and cases."""
         return unjudged_counts_by_cause(self._rangeless, self._unmoving)
 
     def add_truth(self, came: RunTicks, time_s: FloatArray, position_m: FloatArray) -> None:
@@ -113,8 +109,7 @@ class BelievedPositions:
         return BelievedFlights(known, tuple(-state))
 
     def _fitted_states(self, now: RunTicks, now_s: FloatArray) -> tuple[BoolArray, FloatArray]:
-        """Return whether each target's flight is known (n, targets), and its position and velocity
-        (6, n, targets), 0 where not.
+        """Return which flights are known (n, targets), position and velocity (6, n, targets) or 0.
 
         It is known from positions at two instants, not older than `keep_s`, else the last two.
         """
@@ -168,8 +163,7 @@ class BelievedPositions:
         self._unmoving = counts_with_cases_added(self._unmoving, lacking, lacking)
 
     def _last_two_rows(self, now: RunTicks) -> tuple[IntArray, IntArray]:
-        """Return the last and the last but one stored row with a position of each target, at
-        different times, up to each given instant.
+        """Return the last two rows with a target's position, at different times, by each instant.
 
         Both are (n, targets), -1 where there is none.
         """
@@ -198,9 +192,7 @@ class BelievedPositions:
 
 
 def unjudged_counts_by_cause(rangeless: IntArray, unmoving: IntArray) -> dict[str, IntArray]:
-    """Return cause → its (2, runs) counts, of targets without a range or velocity; none for causes
-    that never occurred.
-    """
+    """Return cause, if it occurred, → (2, runs) counts of targets without range or velocity."""
     lacks = {
         "what it hears of has no range and is not judged": rangeless,
         "who is there has no velocity yet and is not judged": unmoving,
@@ -222,8 +214,7 @@ def true_relative_positions_m(states: TrafficStates) -> FloatArray:
 def _group_by_row_and_tick(
     tick: IntArray, row: IntArray, measured: IntArray
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Return each entry's index among the distinct pairs of row and measuring tick, and the rows
-    and ticks of all pairs.
+    """Return each entry's index among distinct (row, tick) pairs, and all pairs' rows and ticks.
 
     `tick` is of a message's rows, `row` and `measured` of its entries.
     """
@@ -239,9 +230,7 @@ def _group_by_row_and_tick(
 def _fit_lines(
     time_s: FloatArray, position_m: FloatArray, now_s: FloatArray
 ) -> tuple[BoolArray, FloatArray]:
-    """Return whether a least-squares line fits each target's positions (n, targets), and its state
-    at `now_s` (6, n, targets), else 0.
-    """
+    """Return whether a line fits (n, targets), and its state at `now_s` (6, n, targets), else 0."""
     seen = np.isfinite(position_m[..., 0])
     count = np.maximum(seen.sum(axis=0), 1)
     # Relative to now, so that clock readings do not cost digits.

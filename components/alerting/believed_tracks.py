@@ -105,8 +105,7 @@ class EstimatedFlights:
         own_place: FloatArray,
         own_velocity: FloatArray | None = None,
     ) -> tuple[IntArray, IntArray, FloatArray, Deviations, FloatArray]:
-        """Return five arrays of the tracks known at these instants: instant, track number, state,
-        deviations, age in s.
+        """Return five arrays of known tracks: instant, track number, state, deviations, age in s.
 
         They are the instant, number, state and deviations of each, and how old its last
         measurement is. `own_velocity` (north, east, down) tells which one is the ownship.
@@ -146,9 +145,7 @@ def _enumerate_entries(begin: IntArray, count: IntArray) -> tuple[IntArray, IntA
 
 
 def _project_to_plane(tracks: KeyedTable, ahead_s: FloatArray, own_place: FloatArray) -> FloatArray:
-    """Return tracks predicted `ahead_s` as east, north, up and their rates (6, n), relative to the
-    ownship's place in its tangent plane.
-    """
+    """Return tracks predicted `ahead_s`, east, north, up, rates (6, n), in own tangent plane."""
     north, east, down = tracks.state[:3] + tracks.state[3:] * ahead_s
     lat_deg, lon_deg, alt_m = enu_to_geodetic(
         east, north, -down,
@@ -213,9 +210,7 @@ class BelievedTracks:
         self._unmoving = np.zeros((2, 0), dtype=np.int64)
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return cause → (2, runs) counts: how often targets could not be judged for it, and of how
-        many cases.
-        """
+        """Return cause → (2, runs) counts: targets that could not be judged for it, and cases."""
         return unjudged_counts_by_cause(self._estimates.rangeless, self._unmoving)
 
     def add(self, arrived: Arrivals, own: OwnPoses, wake: Wake) -> None:
@@ -272,9 +267,7 @@ class BelievedTracks:
 
 
 def _is_needed_later(came: RunTicks, asked: RunTicks, wake: Wake) -> BoolArray:
-    """Return a mask of rows to keep: those that came last before each run's latest scan or after
-    it, in runs that go on.
-    """
+    """Return a mask of rows to keep: last before a run's latest scan, or later, if it goes on."""
     ends = asked.take(asked.last_position_of_runs)
     last = last_position_at_or_before(came, ends)
     there = np.minimum(np.searchsorted(ends.run, came.run), len(ends) - 1)

@@ -157,9 +157,7 @@ class DaidalusAlerting(Component):
         return said
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return cause → (2, runs) counts: how often flights could not be judged for it, and of how
-        many cases.
-        """
+        """Return cause → (2, runs) counts: flights that could not be judged for it, and cases."""
         return {} if self._roster is None else self._belief.failure_counts()
 
     def run(self, wake: Wake) -> AlertLevels | None:
@@ -261,9 +259,7 @@ def _track_columns(flights: BelievedFlights) -> dict[str, AnyArray]:
 
 
 def _ownship_states(own: Mapping[str, FloatArray], scan: IntArray) -> State:
-    """Return the ownship's state at the scan of each row, with its position at 0; unknown altitude
-    or velocity is 0.
-    """
+    """Return own states at rows' scans, with position 0; unknown altitude or velocity is 0."""
     motion = np.array([own[name][scan] for name in _OWN_MOTION])
     motion[np.isnan(motion)] = 0.0
     zero = np.zeros(len(scan))

@@ -175,9 +175,7 @@ def _wind(own: Samples, wind_mps: tuple[float, float] | None) -> FloatArray:
 def _sample_index_and_is_exact(
     own_s: FloatArray, others: list[Samples]
 ) -> tuple[IntArray, BoolArray]:
-    """Return the index of each target's first sample at or after each own time, and whether the two
-    times are equal.
-    """
+    """Return each target's first sample index at or after own times, and whether times agree."""
     index = np.stack([np.searchsorted(o["time"], own_s) for o in others], axis=1)
     index = np.minimum(index, np.array([len(other["time"]) - 1 for other in others]))
     times = _select_samples([other["time"] for other in others], index)
@@ -193,9 +191,7 @@ def _select_samples(columns: list[FloatArray], place: IntArray) -> FloatArray:
 def _states_of_flat_file(
     own: Samples, targets: Samples
 ) -> tuple[Relative, FloatArray, FloatArray, FloatArray]:
-    """Return relative states, own altitude and velocity, own and target positions of a file with
-    east, north and up.
-    """
+    """Return relative states, own altitude, velocity, position, target position of an ENU file."""
     velocity = [(own[key][:, np.newaxis], targets[key]) for key in ("ve", "vn", "vu")]
     at = [(own[key][:, np.newaxis], targets[key]) for key in ("sx", "sy", "sz")]
     relative = tuple(mine - other for mine, other in [*at, *velocity])
@@ -244,9 +240,7 @@ def _alerter_indices(
     present: BoolArray,
     problems: Problems,
 ) -> IntArray:
-    """Return the index, from 0, of the alerter that applies to each target at each time; a problem
-    for one that does not exist.
-    """
+    """Return each target's alerter index, from 0, at each time; a problem if it does not exist."""
     shape = present.shape
     if "alerter" not in own:
         return np.zeros(shape, dtype=np.int64)

@@ -144,9 +144,7 @@ class LevelMemory:
         return level
 
     def forget_absent(self, runs: IntArray, times_s: FloatArray) -> None:
-        """Drop targets that were not updated for longer than the hysteresis time, by the present
-        time of each run (ascending).
-        """
+        """Drop targets not updated within the hysteresis time at each run's present (ascending)."""
         of = self._known.replica
         last = np.minimum(np.searchsorted(runs, of), len(runs) - 1)
         away_s = np.where(runs[last] == of, times_s[last] - self._known.asked_s, 0.0)

@@ -29,9 +29,7 @@ class OthersTracks:
 
     @classmethod
     def from_context(cls, context: Context, probability: float, intensity_m2_s3: float) -> Self:
-        """Return an instance for a block; producers' offers tell which sensors other platforms
-        carry.
-        """
+        """Return an instance for a block; producers' offers tell other platforms' sensors."""
         others = frozenset(
             name
             for name, offer in offers_of_fused_sensors(context.producers).items()
@@ -53,8 +51,7 @@ class OthersTracks:
         own_velocity: FloatArray,
         instant: IntArray,
     ) -> tuple[BoolArray, Deviations]:
-        """Return a mask of the tracks that are the ownship itself, and the deviations of all tracks
-        predicted to their instants.
+        """Return a mask of the ownship's tracks, and all deviations predicted to their instants.
 
         All are carried on to some instants, with the motion's noise, and turned into the axes of
         one's own place (latitude, longitude in rad, height) and velocity (north, east, down). Of

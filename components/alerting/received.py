@@ -78,9 +78,7 @@ class OwnPoses:
     def pose_index_at_measurement(
         self, measured: RunTicks, came: RunTicks, asked: BoolArray
     ) -> IntArray:
-        """Return the index of the newest pose of or before each measurement, of those received by
-        `came`; -1 for none.
-        """
+        """Return the index of the newest pose by each measurement, received by `came`, or -1."""
         index = np.minimum(
             last_position_at_or_before(self._pose_ticks, measured), self._poses.last_row_index(came)
         )
@@ -123,9 +121,7 @@ class OwnPoses:
         }
 
     def set_aside_old_poses(self, tick: int, wake: Wake, *, late_sights: bool) -> None:
-        """Set aside (without `late_sights`: drop) poses from before a tick, and drop those of ended
-        runs.
-        """
+        """Set aside poses before a tick (drop without `late_sights`); drop those of ended runs."""
         if len(self._poses) and self._poses.replica[0] < wake.first_run:
             self._poses = self._poses.take(self._poses.replica >= wake.first_run)
             self._old = []

@@ -254,8 +254,7 @@ def check_positions(
     alt_m: ArrayLike,
     validate: bool = True,
 ) -> tuple[tuple[FloatArray, ...], tuple[int, ...]]:
-    """Return six checked arrays (own latitude, longitude, altitude, then the target's; at least one
-    axis), and their broadcast shape.
+    """Return six checked arrays (own lat, lon, altitude, the target's; ≥ 1-D) and broadcast shape.
 
     Parameters
     ----------

@@ -96,9 +96,7 @@ def greedy_pair_indices(track: IntArray, detection: IntArray, distance: FloatArr
 def least_total_pair_indices(
     track: IntArray, detection: IntArray, distance: FloatArray, missing: FloatArray | float
 ) -> IntArray:
-    """Return the indices of the pairs of least total distance, where a track left without a pair
-    costs `missing`.
-    """
+    """Return the indices of pairs of least total distance; an unpaired track costs `missing`."""
     single = is_only_pair_of_both(track, detection)
     taken = [np.flatnonzero(single)]
     left = np.flatnonzero(~single)

@@ -25,9 +25,7 @@ _MOST_ROUNDS = 10_000
 def pair_probabilities(
     track: IntArray, detection: IntArray, weight: FloatArray, exact_up_to: int = EXACT_UP_TO
 ) -> FloatArray:
-    """Return each pair's joint association probability; what a track's sum lacks to 1 is the
-    probability that it is missed.
-    """
+    """Return pairs' joint association probabilities; a track's sum to 1 with that of its miss."""
     result = np.empty(len(track))
     if len(track) == 0:
         return result
@@ -84,8 +82,7 @@ def exact_pair_probabilities(weights: FloatArray) -> FloatArray:
 
 
 def approximate_pair_probabilities(weights: FloatArray) -> FloatArray:
-    """Return approximate probabilities of the pairs of one cluster, (tracks, detections), by belief
-    propagation.
+    """Return a cluster's approximate pair probabilities (tracks, detections) by belief propagation.
 
     Within 0.1 of exact ones in most clusters; where several tracks share the same detections and
     misses are rare it is too sure of one way round.

@@ -266,8 +266,7 @@ def _rain_attenuation_db_km(
 
 
 def attenuated_range_m(clear_range_m: ArrayLike, specific_attenuation_db_km: ArrayLike) -> Any:
-    """Return the range at which a radar in uniformly attenuating air has the same SNR as at
-    `clear_range_m` without attenuation.
+    """Return a radar's range in uniform attenuation with the same SNR as `clear_range_m` without.
 
     Parameters
     ----------

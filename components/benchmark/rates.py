@@ -135,9 +135,7 @@ def prepare_fully_recorded_replicas(count: int) -> Callable[[], object]:
 
 
 def prepare_risk_runs(count: int) -> Callable[[], object]:
-    """Return a function that, called, runs a chunk of a risk-ratio study, another encounter in each
-    replica, without and with avoidance.
-    """
+    """Return a function to run a chunk, one encounter per replica, without and with avoidance."""
     tables = {
         "replicas": 100_000,
         "metrics": ["risk_ratio"],
@@ -147,9 +145,7 @@ def prepare_risk_runs(count: int) -> Callable[[], object]:
 
 
 def prepare_tracked_risk_runs(count: int) -> Callable[[], object]:
-    """Return a function that, called, runs a chunk of the shipped study `radar_and_camera_risk`,
-    whose avoidance uses tracks.
-    """
+    """Return a function to run a chunk of `radar_and_camera_risk`, whose avoidance uses tracks."""
     volume = {"horizontal_m": 670.56, "vertical_m": 137.16, "by": [], "needless": True}
     tables = {
         "replicas": 100_000,
@@ -199,9 +195,7 @@ class Rate:
 def random_pair_states(
     count: int, within_m: float, apart_m: float, seed: int
 ) -> tuple[State, State]:
-    """Return `count` ownships at the horizontal origin and an intruder each within `within_m`, all
-    with random velocities.
-    """
+    """Return `count` ownships at horizontal 0, intruders within `within_m`, random velocities."""
     random = np.random.default_rng(seed)
 
     def flown(position: list[Any]) -> State:

@@ -47,7 +47,7 @@ def run_benchmark(
         check_file_writable(target, "--json")
     console = terminal.console()
     asked = _Asked(console, quick, repeats or (2 if quick else 5))
-    rows = _measure_calls(asked) if embed else []
+    rows = _measure_and_print_call_times(asked) if embed else []
     if cases and not embed:
         rows += _measure_cases(asked, cases, before)
     if pairs and not embed:
@@ -176,7 +176,7 @@ def _measure_rates(asked: _Asked, rates: list[Rate]) -> list[dict[str, Any]]:
     return rows
 
 
-def _measure_calls(asked: _Asked) -> list[dict[str, Any]]:
+def _measure_and_print_call_times(asked: _Asked) -> list[dict[str, Any]]:
     row = measure_in_new_process("calls", "embed", asked.quick, asked.repeats)
     asked.console.print(f"simulate: {row['what']}; {row['calls']} calls", soft_wrap=True)
     names = {

@@ -166,8 +166,7 @@ def _cpu_seconds_of(run: Callable[[], Any]) -> float:
 def time_build_and_run(
     scene: Scene, scenes: list[Scene], sink: Sink | None
 ) -> tuple[float, float, int]:
-    """Build and run a scene once; return CPU seconds of building, of running, and scans times
-    targets.
+    """Build and run a scene once; return CPU seconds of building, of running, scans times targets.
 
     Without replicas in `scenes` a single run of `scene`; without a sink into Parquet in passing.
     """
@@ -203,9 +202,7 @@ def _count_scans(simulation: Simulation) -> int:
 def _prepare_plain_loop_timing(
     case: BenchmarkCase, scene: Scene, scenes: list[Scene]
 ) -> Callable[[], float]:
-    """Return a function that times the plain loop on the same flights, CPU seconds per
-    target-scan.
-    """
+    """Return a function that times the plain loop on the same flights, CPU s per target-scan."""
     step = max(1, len(scenes) // _SAMPLED_REPLICAS)
     prepared = [
         yardstick.prepare_plain_loop(_fly_if_steered(one)) for one in (scenes[::step] or [scene])

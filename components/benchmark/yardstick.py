@@ -101,9 +101,7 @@ def ned_to_body_matrix(yaw_rad: float, pitch_rad: float, roll_rad: float) -> lis
 def aspect_cosine_sine_body_z(
     north: float, east: float, up: float, range_m: float, attitude: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """Return cosine and sine of the angle between a target's nose and the line of sight, and the
-    size of that line's component along body z.
-    """
+    """Return the aspect angle's cosine and sine, and the sight line's absolute part on body z."""
     m = ned_to_body_matrix(*attitude)
     n, e, d = north / range_m, east / range_m, -up / range_m
     x = m[0] * n + m[1] * e + m[2] * d

@@ -56,8 +56,7 @@ class CameraSights:
     def picture_of_contact(
         self, contact: int, toward: tuple[float, float] | None, time_s: float, own: OwnNow
     ) -> dict[str, Any] | None:
-        """Return the newest camera picture of a contact as fields for the page; None where no
-        camera has seen it.
+        """Return a contact's newest camera picture as page fields; None if no camera has seen it.
 
         Of a tracker that knows no targets the picture nearest to its direction is taken, of bearing
         and elevation `toward`, rad.

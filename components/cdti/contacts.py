@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from components.display.picture_plane import offset_positions
+from components.display.picture_plane import geodetic_from_ned_offsets
 from components.estimation.frame import vectors_in_frame
 from components.geometry import body_to_ned, north_east_up_offsets_m, unit_vector_unchecked
 from components.messages.alerts import TRACKS_FROM
@@ -129,8 +129,7 @@ class Contacts:
 def contacts_after_lines(
     message: Tracks | FusedDetections, own: OwnFlight, ticks_per_s: int, before: Contacts | None
 ) -> Contacts:
-    """Return contacts after newly measured lines of sight, given those before; a missing range is
-    held for a while.
+    """Return contacts after new lines of sight, from those before; a missing range is held a while.
 
     Where only a direction was measured, the last range counts for a while yet. Tracks hold what was
     measured; fused lines are of one instant, and contacts that are not among them stay.
@@ -144,7 +143,7 @@ def contacts_after_lines(
     pose = own.poses_at(message.measured_tick)
     body = unit_vector_unchecked(message.azimuth_rad, message.elevation_rad)
     north, east, down = body_to_ned(*body, *pose[:, 3:].T)
-    ends = offset_positions(np.stack([north, east, down]) * range_m, pose[:, :3].T)
+    ends = geodetic_from_ned_offsets(np.stack([north, east, down]) * range_m, pose[:, :3].T)
     toward = np.stack([np.arctan2(east, north), np.arcsin(np.clip(-down, -1.0, 1.0))], axis=1)
     result = Contacts(
         message.target, seen_s, np.isfinite(range_m), range_m, range_s, ends.T, toward
@@ -159,9 +158,7 @@ def contacts_after_lines(
 def _fill_missing_ranges_and_times(
     number: IntArray, seen_s: FloatArray, range_m: FloatArray, range_s: FloatArray, before: Contacts
 ) -> tuple[FloatArray, FloatArray]:
-    """Return ranges and the times of their measurement, where missing the contact's previous range,
-    if not older than `RANGE_HELD_S`.
-    """
+    """Return ranges and their times; missing ones as the contact's last within `RANGE_HELD_S`."""
     order = np.argsort(before.number, kind="stable")
     known = before.number[order]
     index = np.searchsorted(known, number)
@@ -183,7 +180,7 @@ def contacts_of_states(message: StateTracks, own: OwnFlight, ticks_per_s: int) -
     ned_m = np.stack([message.north_m, message.east_m, message.down_m])[:, lives]
     origin = [message.origin_lat_deg, message.origin_lon_deg, message.origin_alt_m]
     origin = [part[lives] for part in origin]
-    ends = offset_positions(np.where(ranged, ned_m, np.nan), origin)
+    ends = geodetic_from_ned_offsets(np.where(ranged, ned_m, np.nan), origin)
     sight = np.stack(
         unit_vector_unchecked(message.azimuth_rad[lives], message.elevation_rad[lives])
     )

@@ -63,9 +63,7 @@ class LivePacer(Pacer):
         return WINDOW_S * self.factor
 
     def wake(self) -> None:
-        """Make the waiting run check at once whether it may go on; any thread may call it. Any
-        thread may call it.
-        """
+        """Make the waiting run check at once whether it may go on; any thread may call it."""
         self._changed.set()
 
     def stop(self) -> None:
@@ -290,9 +288,7 @@ class SessionControl:
             await page.send({"type": "refused", "id": message.id, "why": why})
 
     def _submit(self, message: Judged | Turned | Climbed, name: str) -> bool:
-        """Queue an operator's decision and return whether that worked; if accepted later, pages are
-        told.
-        """
+        """Queue an operator's decision, return whether it worked; tell pages if accepted later."""
         kind = KINDS.index(message.decision)
         value = getattr(message, "value", 0.0)
         decision = OperatorDecision(

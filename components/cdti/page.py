@@ -74,9 +74,7 @@ class Admission:
         return any(_is_equal_in_constant_time(token, known) for known in self._watching)
 
     def role_and_key(self, token: str, key: str) -> tuple[str, str]:
-        """Return the role (operator or watcher) that token and key give, and the operator's key,
-        empty for a watcher.
-        """
+        """Return the role and the operator's key (empty for a watcher) that token and key give."""
         if self._key and _is_equal_in_constant_time(key, self._key):
             return OPERATOR, self._key
         if self._fresh and _is_equal_in_constant_time(token, self.token):

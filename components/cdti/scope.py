@@ -325,9 +325,7 @@ class Scope:
 def _bands_at(
     received: tuple[float, GuidanceBands] | None, time_s: float
 ) -> dict[str, list[list[Any]]]:
-    """Return the guidance bands valid at an instant, by kind, as lists of [from, to, region]: deg
-    clockwise from north, m, m/s.
-    """
+    """Return guidance bands at an instant by kind: [from, to, region], deg from north, m, m/s."""
     result: dict[str, list[list[Any]]] = {kind: [] for kind in BAND_KINDS}
     if received is None or time_s - received[0] > BANDS_LAST_S:
         return result
@@ -362,9 +360,7 @@ def _alert_fields(alerts: _Alerts, since: dict[int, float]) -> list[dict[str, An
 
 
 def _velocities_by_contact(alerts: _Alerts) -> dict[int, list[float]]:
-    """Return east, north and upward velocity, m/s, of each contact known to the alerting; empty
-    while the own velocity is unknown.
-    """
+    """Return velocity east, north, up, m/s, by contact known to alerting; empty if own is not."""
     moving = alerts.own_mps[:, np.newaxis] - alerts.relative[3:]
     if not np.all(np.isfinite(moving)):
         return {}

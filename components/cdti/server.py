@@ -83,9 +83,7 @@ class PageControl(Protocol):
         """Return the first message to a new page."""
 
     def frame(self, chosen: int) -> dict[str, Any] | None:
-        """Return a page's newest content as a message, for the contact chosen on it; None before
-        the first.
-        """
+        """Return a page's newest content for its chosen contact; None before the first."""
 
     async def on_message(self, page: Page, message: PageMessage) -> None:
         """Process a message from a page."""
@@ -234,7 +232,7 @@ class DisplayServer:
                 await other.connection.close(4001, "opened elsewhere")
         page = Page(connection, role)
         self.pages.append(page)
-        self._report_operator_count()
+        self._store_operator_count_in_control()
         feeding = None
         try:
             await page.send(
@@ -249,9 +247,9 @@ class DisplayServer:
             if feeding is not None:
                 feeding.cancel()
             self.pages.remove(page)
-            self._report_operator_count()
+            self._store_operator_count_in_control()
 
-    def _report_operator_count(self) -> None:
+    def _store_operator_count_in_control(self) -> None:
         self._control.store_operator_count(sum(page.role == OPERATOR for page in self.pages))
 
     async def _handle_text(self, page: Page, text: str | bytes) -> None:

@@ -19,8 +19,7 @@ _STRETCHES = 40
 
 
 def nees_of_nearest_target(one: dict[str, Any], states: FloatArray) -> tuple[FloatArray, BoolArray]:
-    """Return the normalised error squared of each row of a track against its nearest target, NaN
-    where none is within `NEAR_M`, and whether one is.
+    """Return rows' NEES to the nearest target, NaN if none is within `NEAR_M`, and whether one is.
 
     States (targets, 6, rows) are those of the targets at the same times.
     """
@@ -41,8 +40,7 @@ def nees_of_nearest_target(one: dict[str, Any], states: FloatArray) -> tuple[Flo
 
 
 def draw_consistency(path: Path, drawn: DrawnTracks) -> Path | None:
-    """Draw the tracks' normalised squared errors and innovations over time, with 95 % bounds; None
-    if no track is near a target.
+    """Draw the tracks' NEES and NIS over time with 95 % bounds; None if no track is near a target.
 
     A row of a track that has a target counts; the bounds hold 95 % of consistent ones. None is
     drawn where no track is near a target.

@@ -202,9 +202,7 @@ def detection_positions(flights: Flights, detected: Detected) -> Positions:
 
 
 def plot_extent_points(flights: Flights, result: Positions) -> FloatArray:
-    """Return points that the plan must show: the start, detections, and the ownship at their times;
-    km, (points, 2).
-    """
+    """Return the points a plan must show: start, detections, ownship at those times; km, (n, 2)."""
     points = [np.zeros((1, 2))]
     own = flights.own
     for paths in result.values():

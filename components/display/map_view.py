@@ -19,8 +19,7 @@ MAP_WIDTH_IN, _MAP_HEIGHTS_IN = 6.4, (3.8, 6.6)
 
 @dataclass
 class Outline:
-    """A sensor's field of view seen from above: corners (n, 2) east and north in km if closed, else
-    the directions of its edges.
+    """Field of view from above: corners (n, 2) east and north, km, if closed, else edge directions.
 
     One without a limit has the directions of its two edges from where it begins, `start_km`.
     """
@@ -34,8 +33,7 @@ class Outline:
 def outline_of(
     yaw_rad: float, reach: Any, axes: Any, start_km: tuple[float, float] = (0.0, 0.0)
 ) -> Outline:
-    """Return the outline, seen from above, of a sensor's field of view at elevation 0, for a level
-    ownship at `start_km` (east, north) with heading `yaw_rad`.
+    """Return a field of view's outline at elevation 0, ownship level at `start_km` (east, north).
 
     It is drawn as the plane of elevation 0 of the sensor's axes; a tilted sensor foreshortens it.
     """

@@ -278,9 +278,7 @@ class _Tracker:
 def _earliest_time_and_range(
     first: tuple[float, float] | None, columns: Columns, rows: IntArray
 ) -> tuple[float, float] | None:
-    """Return time and estimated range of the earliest among these rows and a former result; at
-    equal times the nearest.
-    """
+    """Return the first time and estimated range, a former result included; at a tie the nearest."""
     if not len(rows):
         return first
     rows = rows[columns["time_s"][rows] == columns["time_s"][rows].min()]

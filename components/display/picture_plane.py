@@ -52,9 +52,10 @@ class TangentPlane:
         return np.arctan2(east, north)
 
 
-def offset_positions(ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray]) -> FloatArray:
-    """Return latitude, longitude (deg) and altitude (m), (3, n), of points offset north, east and
-    down from one origin each.
+def geodetic_from_ned_offsets(
+    ned_m: FloatArray, origin: FloatArray | Sequence[FloatArray]
+) -> FloatArray:
+    """Return latitude, longitude (deg), altitude (m), (3, n), of origins moved north, east, down.
 
     NaN where the offset (3, n) north, east and down is not known.
     """
@@ -91,7 +92,9 @@ def bearings_and_end_points(line: FloatArray, pose: FloatArray) -> tuple[FloatAr
         return result
 
     north, east, _ = ned(known, 1.0)
-    return np.arctan2(east, north), offset_positions(ned(ranged, range_m[ranged]), pose[:3])
+    return np.arctan2(east, north), geodetic_from_ned_offsets(
+        ned(ranged, range_m[ranged]), pose[:3]
+    )
 
 
 def estimated_rows_and_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:
@@ -104,7 +107,9 @@ def estimated_rows_and_positions(run: RecordedTables) -> tuple[IntArray, FloatAr
         return np.empty(0, dtype=np.int64), np.empty((3, 0))
     ned_m = run.stack_columns("state_tracks", POSITION)
     rows = np.flatnonzero(np.isfinite(ned_m).all(axis=0))
-    return rows, offset_positions(ned_m[:, rows], run.stack_columns("state_tracks", ORIGIN, rows))
+    return rows, geodetic_from_ned_offsets(
+        ned_m[:, rows], run.stack_columns("state_tracks", ORIGIN, rows)
+    )
 
 
 def held_range_rows_and_positions(run: RecordedTables) -> tuple[IntArray, FloatArray]:

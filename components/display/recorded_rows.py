@@ -31,8 +31,7 @@ _DETECTIONS = ("block", "target", "time_s", "true_range_m")
 def iterate_row_groups(
     path: Path, columns: Sequence[str], most: float = math.inf
 ) -> Iterator[dict[str, Any]]:
-    """Yield for each row group of a Parquet table the wanted columns by name; nothing if there is
-    no such file.
+    """Yield each Parquet row group's wanted columns by name; nothing if there is no such file.
 
     They are arrays, texts a `Text`. Of a table of more rows than `most`, groups spread over it.
     """

@@ -207,9 +207,7 @@ def _block_platform_pairs(table: Any) -> set[tuple[str, str | None]]:
 
 
 def _rows_on_platform(name: str, table: Any, platform: str, first: str) -> Any:
-    """Return the rows of blocks on a platform; of the table ``truth`` all rows, with the platform's
-    name exchanged for the ownship's.
-    """
+    """Return a platform's rows; of ``truth`` all, its name exchanged for the ownship's."""
     import pyarrow as pa
     import pyarrow.compute as pc
 
@@ -232,9 +230,7 @@ def tables_of(run: Run | str | os.PathLike[str]) -> RecordedTables:
 
 
 def hint_for_shipped_scene(name: str) -> str:
-    """Return the end of an error message that helps a user who named a shipped scene instead of a
-    run; empty otherwise.
-    """
+    """Return an error message's end for a shipped scene named instead of a run; else empty."""
     scene = find_example(name, "scene")
     return f"; of the scene: dsa-des run {name}, then the folder it names" if scene else ""
 

@@ -20,9 +20,7 @@ from dsa_des.running.simulation import Simulation
 
 
 def changed_detections_ratio(changes: Mapping[str, Any]) -> float:
-    """Return detections gained plus lost between two runs, divided by those of the reference
-    run.
-    """
+    """Return detections gained plus lost between two runs, divided by the reference run's."""
     changed = changes.get("detections_gained", 0) + changes.get("detections_lost", 0)
     return float(changed / max(changes.get("detections_reference", 0), 1))
 
@@ -107,8 +105,7 @@ def sensor_names(simulation: Simulation) -> list[str]:
 
 
 def compare_runs(reference: Mapping[str, Any], other: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the differences in detections and fusion between two runs' tables: numbers and lists,
-    by name.
+    """Return differences of two runs' tables in detections and fusion: numbers and lists, by name.
 
     Tables are ``pyarrow.Table`` by name: ``detections`` and ``fused``. ``detections_gained`` and
     ``detections_lost`` count (sensor, target, instant) that only one of the runs has, of

@@ -151,9 +151,7 @@ def alternating_mark_indices(
 
 
 def draw_marks(axes: Any, style: Mark, points: FloatArray) -> int:
-    """Draw a sensor's detections (n, 2), thinned if there are many, without changing the axes'
-    limits, and return how many were drawn.
-    """
+    """Draw detections (n, 2), thinned if many, keeping axes' limits; return the number drawn."""
     few = points[spread_indices(len(points), _MOST_MARKS)]
     axes.plot(
         few[:, 0], few[:, 1], **plot_arguments_of_mark(style), zorder=2.0 + 1.0 / style.size_pt,

@@ -116,9 +116,7 @@ _WHY_NOT_SEEN = {
 
 
 def cut_off_detection_lines(sensors: dict[str, Any]) -> list[str]:
-    """Return one line explaining the asterisk of detections cut off by the run's start or end;
-    empty if there are none.
-    """
+    """Return one line on the asterisk of detections cut off at a run's start or end, or none."""
     ends = {
         f"{which} at {seen['at']}"
         for entry in sensors.values()

@@ -30,8 +30,7 @@ def load_for_host(
     seed: int | None = None,
     platform: str | None = None,
 ) -> Scene:
-    """Return a host's scene, from a file or object; one without traffic gets the block whose
-    aircraft the host moves.
+    """Return a host's scene (file or object); one without traffic gets the block a host moves.
 
     Of several platforms' chains only that of the one that the host's ownship is.
     """
@@ -120,9 +119,7 @@ def _toml_value(value: bool | str) -> str:
 
 
 def traffic_block_name(scene: Scene) -> str:
-    """Return the name of the only block that sends traffic, in whose place a host steps; SceneError
-    if there is not exactly one.
-    """
+    """Return the only traffic block's name, which a host replaces; SceneError if not just one."""
     sources = [name for name, block in scene.blocks.items() if _is_traffic(block.cls)]
     if len(sources) != 1:
         what = (

@@ -123,8 +123,7 @@ def _sighting_text(one: Sighting) -> str:
 def sightings_and_false_alarms(
     fused: FusedDetections | None, detections: Mapping[str, Detections]
 ) -> tuple[dict[int, Sighting], tuple[Sighting, ...]]:
-    """Return sightings of detected planes by the planes' index, and sightings that are false
-    alarms.
+    """Return detected planes' sightings by the planes' index, and sightings that are false alarms.
 
     From one row of each message of a call; `fused` is None when no sensor reported.
     """

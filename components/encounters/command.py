@@ -186,9 +186,9 @@ def show(**options: Any) -> None:
 
     FILE is a set, or whatever `convert` reads.
     """
-    from components.encounters.set_commands import print_set
+    from components.encounters.set_commands import print_set_statistics
 
-    print_set(**options)
+    print_set_statistics(**options)
 
 
 @encounters.command()

@@ -31,8 +31,7 @@ _MOST = 20
 
 @dataclass(frozen=True)
 class EncounterTable:
-    """Columns of a table with one row per encounter, as texts or as numbers where the file has
-    types; None for an empty cell.
+    """Table columns, one row per encounter: texts, or numbers if the file has types; None if empty.
 
     `lines` says where each row stands in the file, from 1.
     """

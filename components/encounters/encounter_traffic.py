@@ -237,9 +237,7 @@ class _EncounterTraffic(RecordedTraffic):
 
     @classmethod
     def choose_encounters(cls, parameters: Sequence[Any]) -> list[Encounter]:
-        """Return for each block's parameters an encounter set and the index of the encounter in
-        it.
-        """
+        """Return for each block's parameters an encounter set and the encounter's index in it."""
         return [encounter_of_parameters(cls, p) for p in parameters]
 
     @classmethod
@@ -299,9 +297,7 @@ class ModelTraffic(_EncounterTraffic):
 
     @classmethod
     def choose_encounters(cls, parameters: Sequence[Any]) -> list[Encounter]:
-        """Return for each block's parameters a sampled set and the index of its encounter, all
-        sampled at once.
-        """
+        """Return for each block a sampled set and its encounter's index, all sampled at once."""
         keys = [_pair_key(p) for p in parameters]
         _PAIRS.prepare(keys)
         return [_PAIRS[key] for key in keys]
@@ -314,9 +310,7 @@ class ModelTraffic(_EncounterTraffic):
 
 
 def encounter_of_parameters(cls: type, parameters: Any) -> tuple[EncounterSet, int]:
-    """Return the encounter set that a block's parameters name, not moved, and the encounter's index
-    in it.
-    """
+    """Return the set that a block's parameters name, not moved, and the encounter's index in it."""
     if issubclass(cls, ModelTraffic):
         found: Encounter = _PAIRS[_pair_key(parameters)]
         return found
@@ -378,9 +372,7 @@ def _pair_key(parameters: Any) -> tuple[_Model, int]:
 
 
 def _sample_pairs(keys: Sequence[tuple[_Model, int]]) -> list[Encounter]:
-    """Return for each model and number a set and the index of its encounter there; those of one
-    model are sampled together.
-    """
+    """Return by model and number a set and its encounter's index, sampled together by model."""
     numbers_of: dict[_Model, set[int]] = {}
     for model, number in keys:
         numbers_of.setdefault(model, set()).add(number)

@@ -118,9 +118,7 @@ class ClosestApproachPassed(Component):
         return RunEnd(wake.ticks[over], run=wake.run[over]) if over.any() else None
 
     def _ranges_m_and_presence(self, states: TrafficStates) -> tuple[FloatArray, BoolArray]:
-        """Return the distances (rows, pairs) in m between all aircraft or from the ownship, and
-        whether both are present.
-        """
+        """Return distances (rows, pairs), m, of all or to the ownship, and if both are present."""
         own = [getattr(states, f"own_{name}")[:, np.newaxis] for name in POSITION_FIELDS]
         others = [getattr(states, name) for name in POSITION_FIELDS]
         if self.p.between != "any two":

@@ -300,9 +300,7 @@ def _write_recorded_pairs(
 def _pair_recorded_flights(
     windows: TrackWindows, draws: EncounterDraws, rules: PairingRules, number: int
 ) -> tuple[float, tuple[FloatArray, FloatArray], int]:
-    """Return the weight of one pair of recorded flights, the paths of both (m), and the number of
-    proposals until it was accepted.
-    """
+    """Return a flight pair's weight, both paths (m) and the number of proposals until accepted."""
     who = np.array([number])
     for attempt in range(_MOST_TRIES):
         drawn = draws.uniform(who, 4 + 2 * COURSES, attempt)
@@ -343,9 +341,7 @@ def _pair_recorded_flights(
 def _parse_pairing_rules(
     horizontal: tuple[str, str] | None, vertical: tuple[str, str] | None
 ) -> PairingRules:
-    """Return the pairing rules with the miss distances that the command line gives; UsageError if
-    they do not fit.
-    """
+    """Return pairing rules with command-line miss distances; UsageError if they do not fit."""
     steps = []
     for option, given in (("--horizontal", horizontal), ("--vertical", vertical)):
         try:

@@ -167,9 +167,7 @@ class PairSampler:
     def _accepted_proposals(
         self, numbers: IntArray, attempts: IntArray, narrow: IntArray, bound: FloatArray
     ) -> tuple[IntArray, IntArray, Pairs | None]:
-        """Return the indices of accepted proposals, their rows among the returned pairs, and these
-        pairs, None without any.
-        """
+        """Return accepted proposals' indices, rows in returned pairs, and these pairs or None."""
         if not len(numbers):
             return numbers, numbers, None
         rules, cpa = self.rules, self.rules.closest_s
@@ -202,7 +200,7 @@ class PairSampler:
         for k, flight in enumerate(both):
             climb = flight.commands.climb_ft_s[:, done]
             done = done[
-                self._rules[k].is_within_altitudes(cumulative_sums(altitude[k, done], climb))
+                self._rules[k].stays_within_altitudes(cumulative_sums(altitude[k, done], climb))
             ]
         if not len(done):
             return done, done, None

@@ -85,9 +85,7 @@ class EncounterWeight(Metric):
         }  # fmt: skip
 
     def foresee(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return number, weight and family of every replica's encounter, by name, before any
-        flight.
-        """
+        """Return every replica's encounter number, weight, family, by name, before any flight."""
         return self.measure(group)
 
 
@@ -175,9 +173,7 @@ class RiskRatios(Mitigated):
         return result
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return every replica's event flags, encounter, weight and classes, by name, without the
-        ratios.
-        """
+        """Return by name each replica's event flags, encounter, weight, classes; not the ratios."""
         result = dict(super().measure(group))
         result |= self._weights_and_classes(group, result)
         if self.p.needless:
@@ -187,18 +183,14 @@ class RiskRatios(Mitigated):
         return result
 
     def unit_weights(self, group: Group) -> FloatArray:
-        """Return the weight of each replica's encounter, or the base class's weights if encounters
-        have none.
-        """
+        """Return each replica's encounter's weight, or the base class's if encounters have none."""
         if self._weight is None:
             return super().unit_weights(group)
         weights: FloatArray = self._weight.measure(group)["encounter_weight"]
         return weights
 
     def nominal_event_flags(self, group: Group) -> dict[str, AnyArray]:
-        """Return both events' flags without manoeuvres, from straight paths where they suffice,
-        else from flights.
-        """
+        """Return both events' unmanoeuvred flags, from straight paths or, if needed, flights."""
         meeting = meetings_in_plane(group, self.p)
         if meeting is None:
             return super().nominal_event_flags(group)

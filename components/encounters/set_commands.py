@@ -146,7 +146,9 @@ def _closest_approach_figures(encounters: EncounterSet, index: int) -> tuple[flo
     return best[1]
 
 
-def print_set(files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool) -> None:
+def print_set_statistics(
+    files: tuple[str, ...], most: int, figure: str | None, skip_damaged: bool
+) -> None:
     """Print a set's encounters: number, weights, closest approaches; draw them on request."""
     path = None if figure is None else user_path(figure, "--figure")
     if path is not None:

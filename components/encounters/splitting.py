@@ -53,9 +53,7 @@ def draw_copy_counts(numbers: IntArray, expected: FloatArray, seed: int) -> IntA
 
 
 def split_set(encounters: EncounterSet, expected: FloatArray, seed: int) -> EncounterSet:
-    """Return a set of copies, numbered from 0, with divided weights and the number of the encounter
-    they are copies of.
-    """
+    """Return copies as a set, numbered from 0, with divided weights and originals' numbers."""
     many = draw_copy_counts(encounters.numbers, expected, seed)
     indices = np.repeat(np.arange(len(encounters)), many)
     family: AnyArray = encounters.extra.get(FAMILY, encounters.numbers)

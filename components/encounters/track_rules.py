@@ -158,7 +158,7 @@ class TrackRules:
     def is_accepted(self, tracks: SampledTracks, flown: FlownTracks) -> BoolArray:
         """Return which flown tracks keep the limits of speed, vertical rate and model altitudes."""
         good = self.keeps_limits(tracks, flown.climb_ft_s, flown.speed_ft_s)
-        return good & self.is_within_altitudes(flown.up_ft)
+        return good & self.stays_within_altitudes(flown.up_ft)
 
     def keeps_limits(
         self, tracks: SampledTracks, climb_ft_s: FloatArray, speed: FloatArray
@@ -172,7 +172,7 @@ class TrackRules:
         steepest = self.steepest_climb_ft_s(tracks)
         return good & (climb_ft_s.max(axis=0) <= steepest) & (climb_ft_s.min(axis=0) >= -steepest)
 
-    def is_within_altitudes(self, up_ft: FloatArray) -> BoolArray:
+    def stays_within_altitudes(self, up_ft: FloatArray) -> BoolArray:
         """Return which tracks stay within the model's outermost altitudes, and not below 0 ft."""
         lowest = max(float(self._edges_ft[0]), 0.0)
         good: BoolArray = up_ft.min(axis=0) >= lowest

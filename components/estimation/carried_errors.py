@@ -150,8 +150,7 @@ class ReportedErrors:
 
     @property
     def uncorrected_components(self) -> BoolArray | None:
-        """Return a mask (k, n) of state components that late reports must not correct; None if no
-        report is late.
+        """Return a mask (k, n) of components that late reports must not correct; None without any.
 
         All that an aircraft reports is late alike, so its reports do not tell by how much: only
         the errors of linearising would seem to.
@@ -183,9 +182,7 @@ class ReportedErrors:
         return seen, whole
 
     def effects_on_reported_states(self, moving: FloatArray, pose: SensorPose) -> FloatArray:
-        """Return the change of position and velocity by one standard deviation of each error, (6,
-        errors, n).
-        """
+        """Return position and velocity changes per error's standard deviation, (6, errors, n)."""
         state = np.zeros((_MOVING + len(self.ways), moving.shape[1]))
         state[:_MOVING] = moving
         return self._effects_in_cylinder(state, self._reported_states(state, pose)[2])
@@ -291,8 +288,7 @@ class Ages:
     def error_covariances(
         self, model: Motion, state: FloatArray, velocity_variance: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the covariance of the errors that age adds to reported position and velocity, and
-        the state's covariance with them.
+        """Return the covariance of age's errors in position and velocity, and the state's with it.
 
         They are (6, 6, n) and (d, 6, n), in m and m/s. What was reported of then is what the
         motion back from now says, less what noise has changed since, seen back from now.

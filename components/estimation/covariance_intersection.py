@@ -37,9 +37,7 @@ _CLOSE = 1e-15
 def intersect_covariances(
     covariance: FloatArray, information: FloatArray, pull: FloatArray, rule: Rule
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the state's change, the new covariance, and the weight (0 to 1) of the given
-    covariance, by covariance intersection.
-    """
+    """Return the state's change, the new covariance, and the given covariance's weight (0 to 1)."""
     root = cholesky(covariance)
     scaled = matrix_product(matrix_product(root.swapaxes(0, 1), information), root)
     # LAPACK takes matrix by matrix: the result does not depend on the company.
@@ -60,8 +58,7 @@ def intersect_covariances(
 
 
 def best_weight(eigenvalues: FloatArray, cost: FloatArray, power: int) -> FloatArray:
-    """Return the weight w in [0, 1] at which Σ cost (1 - λ) / (w + (1 - w) λ)^power is 0, or the
-    nearer end.
+    """Return w in [0, 1] where Σ cost (1 - λ) / (w + (1 - w) λ)^power is 0, or else the nearer end.
 
     By Newton's steps, halving where they leave the bracket; `power` is 1 for the determinant, 2
     for the trace.

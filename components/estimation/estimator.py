@@ -313,9 +313,7 @@ def log_mixture(weights: FloatArray, log_likelihoods: FloatArray) -> FloatArray:
 def mixture_by_track(
     track: IntArray, count: int, share: FloatArray, states: FloatArray, covariances: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return mean (d, tracks) and covariance (d, d, tracks) of each track's Gaussians, weighted by
-    shares that sum to 1.
-    """
+    """Return mean (d, tracks), covariance (d, d, tracks) of tracks' Gaussians; shares sum to 1."""
 
     def summed(values: FloatArray) -> FloatArray:
         return np.asarray(np.bincount(track, weights=values, minlength=count), dtype=float)

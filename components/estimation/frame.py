@@ -108,8 +108,8 @@ class FrameChange:
 
 
 def frame_change(old_deg_m: FloatArray, new_deg_m: FloatArray) -> FrameChange:
-    """Return the change from frames with old origins to frames with new ones, given as latitude,
-    longitude (deg) and height (m).
+    """Return the change from frames with old origins to frames with new ones, each (3, n):
+    latitude, longitude (deg) and height (m).
     """
     old, new = (tuple(np.ascontiguousarray(row) for row in rows) for rows in (old_deg_m, new_deg_m))
     north, east, up = north_east_up_offsets_m(*new, *old)

@@ -69,9 +69,7 @@ def iterate_updates_in_place(
 def _nonlinearity_in_deviations(
     kind: Kind, pose: SensorPose, state: FloatArray, moved: FloatArray, slope: Innovation
 ) -> FloatArray:
-    """Return by how many standard deviations the linearised measurement at `state` is wrong at
-    `moved`, the most of all components.
-    """
+    """Return the largest error at `moved` of linearising at `state`, in standard deviations."""
     step = (moved - state)[: slope.jacobian.shape[1]]
     off = residual(
         expected_measurement(kind, moved, pose),

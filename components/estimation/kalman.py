@@ -183,8 +183,7 @@ _MOST = 1e9
 def equivalent_independent_variance(
     variance: FloatArray, common: FloatArray, spread: FloatArray
 ) -> FloatArray:
-    """Return the variance of a measurement with independent errors that would improve the track as
-    much as this correlated one.
+    """Return a variance that, if independent, improves the track as much as this correlated one.
 
     Where the error of a measurement has the covariance κ with that of what a track expects of it
     (of variance p), the best estimate of both has the variance (p R - κ²) / (p + R - 2 κ)

@@ -63,9 +63,7 @@ def expected_measurement(kind: Kind, state: FloatArray, pose: SensorPose) -> Flo
 
 
 def linearise(kind: Kind, state: FloatArray, pose: SensorPose) -> tuple[FloatArray, FloatArray]:
-    """Return the measurement without errors (m, n), and its derivative by position, and velocity if
-    it matters.
-    """
+    """Return the exact measurement (m, n), its derivative by position, and velocity if needed."""
     away = state[:3] - pose.position_m
     turned = pose.to_body
     x, y, z = matrix_times_vector(turned, away)

@@ -38,9 +38,7 @@ _UPRIGHT = 0.1
 def apply_correction_in_polar(
     before: FloatArray, after: FloatArray, covariance: FloatArray, sensor_m: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Return state and covariance with a Cartesian correction applied as a change of modified polar
-    coordinates instead.
-    """
+    """Return state, covariance with a Cartesian correction made in modified polar coordinates."""
     axes, distance, by_range, to_polar = _polar_geometry(before, sensor_m)
     change = matrix_times_vector(to_polar, after[:6] - before[:6])
     return _apply_polar_change(
@@ -147,9 +145,7 @@ def update_with_first_range(
 def _polar_geometry(
     state: FloatArray, sensor_m: FloatArray
 ) -> tuple[list[FloatArray], FloatArray, FloatArray, FloatArray]:
-    """Return axes at the line of sight, range, velocity along the axes over range, and the
-    derivative of polar coordinates.
-    """
+    """Return axes at the line of sight, range, velocity along axes over range, polar derivative."""
     away, velocity = state[:3] - sensor_m, state[3:6]
     distance = np.maximum(np.sqrt(squared_length(away)), _NEAREST_M)
     axes = _line_of_sight_axes(away / distance)
@@ -198,8 +194,7 @@ def _line_of_sight_axes(line: FloatArray) -> list[FloatArray]:
 def _polar_jacobian(
     axes: list[FloatArray], distance: FloatArray, velocity: FloatArray
 ) -> FloatArray:
-    """Return the derivative (6, 6, n) of polar coordinates by position and velocity, at the line of
-    sight.
+    """Return polar coordinates' derivative (6, 6, n) by position and velocity, at a line of sight.
 
     They are two angles, the inverse of the range, and the velocity along the line of sight and
     across it, divided by the range.

@@ -67,9 +67,7 @@ def asterix_bytes(run: RecordedTables) -> bytes:
 
 
 def _north_markers_and_plots(run: RecordedTables, sic: dict[str, int]) -> Iterator[AsterixRecord]:
-    """Yield for each radar scan a north marker with the radar's position, and a plot for each
-    detection with a measured range.
-    """
+    """Yield each radar scan's north marker with position, and plots of detections with a range."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         return
     lines = run.stack_columns("detections", LINE)

@@ -80,9 +80,7 @@ def _check_options(to: str, **given: float | None) -> None:
 
 
 def _geoid_note_and_height_m(tables: RecordedTables, given_m: float | None) -> tuple[str, float]:
-    """Return a note on where the geoid's height comes from (empty if it was given), and that height
-    above the ellipsoid in m.
-    """
+    """Return a note on the geoid's source (empty if given) and its height over the ellipsoid, m."""
     known_m = scene_undulation_m(tables)
     if given_m is not None:
         said, geoid_m = "", given_m

@@ -26,8 +26,7 @@ _XYZ_HEAD = (
 
 
 def daa_text(run: RecordedTables, step_s: float = STEP_S) -> str:
-    """Return the true flights as the text of a `.daa` file, rows in order of time: the format that
-    DAIDALUS and `traffic.daa_file` read.
+    """Return true flights as `.daa` text in order of time, as DAIDALUS and `traffic.daa_file` read.
 
     The ownship comes first; a name that such a file cannot hold is refused. Rows are at multiples
     of `step_s` while an aircraft flies, with 0 at the instants that were recorded: a run records
@@ -119,9 +118,7 @@ def _text_rows(
     step_s: float,
     columns: Callable[[Mapping[str, FloatArray]], Sequence[FloatArray]],
 ) -> list[str]:
-    """Return a line of text for each aircraft and time, in order of time: its name, the given
-    columns of its flight, the time.
-    """
+    """Return a line per aircraft and time, in order of time: name, columns of its flight, time."""
     rows: list[tuple[float, int, str]] = []
     for number, (name, flight) in enumerate(run.true_flights().items()):
         if any(c in name for c in ",;\t\n\r ") or not name:

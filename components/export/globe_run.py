@@ -58,9 +58,7 @@ class Course:
 
 @dataclass(frozen=True)
 class DetectedPlace:
-    """A detection with a range: its sensor, its target, its time and its position (longitude,
-    latitude, height as in `Course`).
-    """
+    """Detection with range: sensor, target, time, (longitude, latitude, height) as in `Course`."""
 
     sensor: str
     target: str

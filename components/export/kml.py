@@ -46,7 +46,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
         f"<name>{_escaped_xml_text(shown.name)}</name>",
         f"<description>Heights above sea level: those of the run, above the WGS 84 ellipsoid, less "
         f"{geoid_m:g} m for the geoid. Second 0 is {iso_time(0.0)}.</description>",
-        *_look_at_lines(shown, geoid_m),
+        *_look_at_first_own_position_lines(shown, geoid_m),
         *_styles(shown),
     ]
     lines += _folder("Aircraft", _courses(shown.flights, "aircraft", geoid_m))
@@ -60,7 +60,7 @@ def kml_text(run: RecordedTables, geoid_m: float = 0.0) -> str:
     return "\n".join([*lines, "</Document>", "</kml>", ""])
 
 
-def _look_at_lines(shown: GlobeRun, geoid_m: float) -> list[str]:
+def _look_at_first_own_position_lines(shown: GlobeRun, geoid_m: float) -> list[str]:
     """Return KML LookAt lines, by which a globe first looks at the ownship's first position."""
     lon, lat, alt = shown.flights[0].position[0].tolist()
     return [

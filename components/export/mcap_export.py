@@ -68,8 +68,7 @@ _FOXGLOVE = {
 
 
 def mcap_bytes(run: RecordedTables) -> bytes:
-    """Return a run as the bytes of an MCAP file: a topic for each table, two for each aircraft, and
-    one for the detections.
+    """Return a run as MCAP bytes: a topic for each table, two per aircraft, one for detections.
 
     ``/tables/NAME`` has the rows of a table, null where nothing stands; its schema says the units.
     ``/aircraft/NAME/location`` and ``/pose`` are the true flights, where they are recorded; axes of
@@ -140,9 +139,7 @@ def _column_schema(field: Any) -> dict[str, Any]:
 
 
 def _scene_messages(run: RecordedTables) -> Iterator[_Message]:
-    """Yield messages of the true flights and of the detections, with poses relative to the
-    ownship's first position.
-    """
+    """Yield messages of true flights and detections, posed from the ownship's first position."""
     flights = run.true_flights() if "truth" in run.tables else {}
     origin: tuple[float, ...] | None = None
     for name, flight in flights.items():

@@ -19,8 +19,7 @@ _JUDGED, _ACTS = ("verified", "rejected"), ("turn", "climb")
 
 
 def operator_csv(run: RecordedTables) -> bytes:
-    """Return a CSV file with a row for each alert: when it began, was displayed, was looked at, was
-    judged and was acted on.
+    """Return CSV, a row for each alert: when it began, was displayed, looked at, judged, acted on.
 
     Alerts are those of `alerts_of`; of several platforms those on which somebody decides, each by
     itself.

@@ -120,9 +120,7 @@ def recorded_run(
 
 
 def _detection_columns(run: RecordedTables) -> dict[str, Any]:
-    """Return the columns of the detections by name; the time is that of illumination where a
-    sweeping beam has one.
-    """
+    """Return detections' columns by name; time is of illumination where a sweeping beam has one."""
     if "detections" not in run.tables or run.tables["detections"].num_rows == 0:
         raise UsageError(f"{run.folder}: has no detections")
     names = [*_MEASURED, *_VARIANCES, *POSE, "illuminated_s", "time_s"]
@@ -150,9 +148,7 @@ def _detection_columns(run: RecordedTables) -> dict[str, Any]:
 def _ownship_poses(
     run: RecordedTables, columns: Mapping[str, Any], flights: Mapping[str, Any]
 ) -> FloatArray:
-    """Return the ownship's pose at each detection, (6, n): as its navigation gave it, where
-    recorded, else the true one.
-    """
+    """Return ownship poses at detections, (6, n): by navigation where recorded, else true ones."""
     pose = np.stack([columns[name] for name in POSE])
     unknown = np.isnan(pose).any(axis=0)
     if not unknown.any():
@@ -185,9 +181,7 @@ def _origin(run: RecordedTables, pose: FloatArray) -> Origin:
 def _detections_by_scan(
     run: RecordedTables, columns: Mapping[str, Any], poses: Poses
 ) -> Iterator[tuple[datetime, set[Detection]]]:
-    """Yield each scan's time and its set of detections, in order of time; at equal times sensors
-    with ranges come first, then by name.
-    """
+    """Yield times and detections of scans, by time, then those with ranges first, then by name."""
     block, time_s = columns["block"], columns["time_s"]
     ranged = set(block[np.isfinite(columns["range_m"])])
     result: dict[tuple[float, bool, str], list[int]] = {}

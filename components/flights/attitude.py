@@ -139,9 +139,7 @@ def _fit_acceleration(
     time_s: FloatArray, lat_deg: FloatArray, lon_deg: FloatArray, velocity: Vector,
     offsets: Sequence[int],
 ) -> Vector:  # fmt: skip
-    """Return accelerations (m/s²): slopes of straight lines fitted to the velocities around each
-    sample, in its own local frame.
-    """
+    """Return accelerations (m/s²) from lines fitted to nearby velocities, in samples' frames."""
     east, north, _ = east_north_up_axes(lat_deg, lon_deg)
     x, y, z = (velocity[0] * e + velocity[1] * n for e, n in zip(east, north, strict=True))
     v_up = velocity[2]
@@ -223,9 +221,7 @@ def _ratio_or_zero(numerator: FloatArray, denominator: FloatArray) -> FloatArray
 
 
 def _fill_yaw_where_still(yaw: FloatArray, moving: np.ndarray) -> FloatArray:
-    """Return yaws where samples that do not move take that of the last moving sample before, or
-    else of the first moving one.
-    """
+    """Return yaws; still samples take that of the last moving one before, or else of the first."""
     if moving.all():
         return yaw
     index = np.arange(len(yaw)).reshape(len(yaw), *(1 for _ in yaw.shape[1:]))

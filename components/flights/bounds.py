@@ -41,8 +41,7 @@ _POSITION_MARGIN_M = 1.0
 
 
 class OwnPath(NamedTuple):
-    """The ownship's sampled positions over a run, and how far (m) it can be from one of them until
-    halfway to the next.
+    """The ownship's sampled positions, and how far (m) it gets from one until halfway to the next.
 
     `place` is latitude and longitude in degrees, and altitude in m.
     """
@@ -194,7 +193,7 @@ def check_above_terrain(own_at: FlightAt, terrain_m: float, duration_s: float) -
         )
 
 
-def check_above_raster_ground(
+def check_over_raster_above_ground(
     own_at: FlightAt, raster: ElevationRaster, offset_m: float, duration_s: float
 ) -> None:
     """Raise ValueError if the ownship never is over the raster, or is once not above its ground."""

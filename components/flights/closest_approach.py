@@ -250,9 +250,7 @@ def describe_censoring_ends(
     time_s: FloatArray,
     end_s: float,
 ) -> list[str]:
-    """Return for each target, in words, which end of the times its closest approach is at, or
-    nothing.
-    """
+    """Return by target, in words, at which end of the times its closest approach is, or nothing."""
     present_s = np.array(common_presence_bounds_s(own, targets.intervals_present_s, end_s))
     looked_s = np.array(_sample_span_s(compared_at, *present_s))
     return [

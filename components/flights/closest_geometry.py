@@ -116,9 +116,7 @@ def _intruder_positions_at_angle(
 def _relative_position_dot_velocity(
     a: Approach, lat: FloatArray, lon: FloatArray, altitude: FloatArray
 ) -> FloatArray:
-    """Return the dot product of relative position and relative velocity, of their horizontal parts
-    alone if ``sense`` is horizontal.
-    """
+    """Return relative position dot velocity, horizontal only if ``sense`` is horizontal."""
     own_lat, own_lon = np.full_like(lat, a.lat_deg), np.full_like(lat, a.lon_deg)
     n, e, d = line_of_sight_ned(own_lat, own_lon, a.altitude_m[0], lat, lon, altitude)
     own, other = east_north_up_axes(own_lat, own_lon), east_north_up_axes(lat, lon)

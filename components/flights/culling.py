@@ -194,9 +194,7 @@ class SteeredCulling:
     def own_states_and_near_mask(
         self, own: SteeredFleet, run: IntArray, time_s: FloatArray
     ) -> tuple[TrajectoryState, BoolArray]:
-        """Return the ownships' states at each row with the steering so far, and a mask (rows,
-        targets), True where a target may be within reach.
-        """
+        """Return own states at rows as steered, and if targets may be in reach, (rows, targets)."""
         rows = len(time_s)
         epoch = np.floor(time_s / self.epoch_s[run]).astype(np.int64)
         fastest = np.maximum(own.largest_manoeuvre_speed_mps(run, time_s), self._own_mps[run])
@@ -224,9 +222,7 @@ class SteeredCulling:
         return TrajectoryState(*(values[:rows] for values in here)), near
 
     def _target_positions_at_epoch(self, run: IntArray, epoch: IntArray) -> FloatArray:
-        """Return the positions (3, n, targets) of each run's targets at the start of its epoch,
-        computing what is not stored yet.
-        """
+        """Return target positions (3, n, targets) at epoch starts, computing what is not stored."""
         _, _, room, width = self._position.shape
         position, left = np.empty((3, len(run), width)), np.arange(len(run))
         while len(left):

@@ -37,9 +37,7 @@ class Trajectory(Protocol):
 
 
 class Fleet(Sequence[Any]):
-    """The flights of many aircraft, evaluated together, equal to the bit to each alone; an item is
-    a single flight.
-    """
+    """Many flights, evaluated together, to the bit as each alone; an item is a single flight."""
 
     @cached_property
     def max_speeds_mps(self) -> FloatArray:

@@ -179,8 +179,7 @@ def position_and_yaw_on_geodesic(
 def _advance_angle(
     sine: FloatArray, cosine: FloatArray, delta: FloatArray, spare: FloatArray
 ) -> None:
-    """Advance a sine and cosine in place by a small angle (below 9e-4 rad); ``delta`` and ``spare``
-    are overwritten.
+    """Advance sine and cosine in place by at most 9e-4 rad; ``delta``, ``spare`` are overwritten.
 
     The small angle's own sine and cosine are series to its fifth power; then the addition theorem.
     """

@@ -195,9 +195,7 @@ def position_and_yaw_on_turn(
 def _position_and_direction(
     table: FloatArray, offset: Pair, motion: Pair, rho: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return latitude and longitude (deg) at angular offsets from a place, and the east and north
-    parts of the motion there, up to a common factor.
-    """
+    """Return latitude, longitude (deg) at angular offsets, and unscaled motion east and north."""
     (east, north), (d_east, d_north) = offset, motion
     sin_rho, cos_rho = np.sin(rho), np.cos(rho)
     sinc = sin_rho / rho
@@ -294,8 +292,7 @@ Kind = Literal["geodesic", "turn", "hold", "ramp"]
 
 @dataclass(frozen=True)
 class Segment:
-    """One leg ready to be evaluated: its formula's parameters, its start (s) since the flight's
-    start, its pitch and roll, and its speed along the path.
+    """A leg to evaluate: its formula's parameters, start (s) in flight, pitch, roll, path speed.
 
     A "ramp" is level, from one velocity to another (`ramp_parameters`), with its largest speed.
     A "hold" stays in one position, and may climb and turn on the spot; the rows of its table are
@@ -313,9 +310,7 @@ class Segment:
 def position_and_yaw_held(
     table: FloatArray, elapsed: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return latitude, longitude (deg), altitude (m) and yaw (rad) of aircraft that stay in one
-    position; the table's rows are listed at `Segment`.
-    """
+    """Return latitude, longitude (deg), altitude (m), yaw (rad) held still; rows: see `Segment`."""
     zero = np.zeros_like(elapsed)
     # Reduced before the sum, so that hours of turning keep their digits and stay in [0, 2 pi).
     yaw = remainder(table[4] + table[5] * elapsed, TWO_PI)

@@ -19,9 +19,7 @@ from dsa_des.block.parameters import Parameters
 
 
 def require(condition: bool, name: str, value: object, allowed: str) -> None:
-    """Raise ValueError with an argument's name, value and what is allowed if a condition is
-    false.
-    """
+    """Raise ValueError with an argument's name, value and what is allowed if a condition fails."""
     if not condition:
         raise ValueError(f"{name} is {value}: it must {allowed}")
 
@@ -258,9 +256,7 @@ class LegBuilder:
         self.position = (lat, lon, alt)
 
     def _position_of(self, point: Waypoint) -> Position:
-        """Return a waypoint's latitude, longitude (deg) and altitude (m); without an altitude of
-        its own it has the one before.
-        """
+        """Return a waypoint's latitude, longitude (deg), altitude (m), its own or the previous."""
         before = self.position[2]
         if point.lat_deg is not None and point.lon_deg is not None:
             return point.lat_deg, point.lon_deg, before if point.alt_m is None else point.alt_m

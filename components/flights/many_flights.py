@@ -176,9 +176,7 @@ class SteeredFleet(Growing, Fleet):
     def each(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> TrajectoryState:
-        """Return the states (n,) of the given ownships, each at its own time (s), flown by the
-        first ``known`` of their manoeuvres or by all.
-        """
+        """Return ownships' states (n,) at own times (s), with first ``known`` manoeuvres or all."""
         own, after, which = self._rows_before_after_and_part(aircraft, time_s, known)
         if not len(after):
             return self._states_before_steering(aircraft, time_s)
@@ -251,9 +249,7 @@ class SteeredFleet(Growing, Fleet):
     def ground_speeds_mps(
         self, aircraft: IntArray, time_s: FloatArray, known: IntArray | None = None
     ) -> FloatArray:
-        """Return the ground speeds (m/s) of the given ownships, each at its own time, flown by the
-        first ``known`` of their manoeuvres or by all.
-        """
+        """Return ground speeds (m/s) at own times, flown by first ``known`` manoeuvres or all."""
         own, after, which = self._rows_before_after_and_part(aircraft, time_s, known)
         speed_mps = np.empty(len(time_s))
         speed_mps[own] = self._flights.ground_speeds_mps(aircraft[own], time_s[own])
@@ -292,8 +288,7 @@ class SteeredFleet(Growing, Fleet):
         time_s: FloatArray,
         manoeuvres: Sequence[Manoeuvre] | FloatArray,
     ) -> SteeredFleet:
-        """Return a new fleet in which ownships (each at most once) fly manoeuvres from the given
-        times on, beside what they still fly of earlier ones.
+        """Return a new fleet with further manoeuvres (at most one per ownship) from given times on.
 
         A turn or a change of altitude begins and ends at once, without a change of speed along the
         path's projection and without acceleration upward; speeds change steadily. A velocity is

@@ -44,8 +44,7 @@ Rates = list[tuple[float, float]]
 
 @dataclass(frozen=True)
 class FlownTracks:
-    """Many tracks flown side by side, arrays (instants, tracks) ``step_s`` apart from 0 s on; north
-    and east are counted from each track's start.
+    """Tracks side by side, (instants, tracks) ``step_s`` apart from 0 s; north, east from starts.
 
     Up is the altitude, speed the true airspeed; headings are clockwise from north.
     """

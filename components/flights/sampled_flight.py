@@ -226,7 +226,7 @@ class SampledTrajectory:
             flights.append(made)
         return flights
 
-    def with_attitude_in_wind(
+    def with_derived_angles_in_wind(
         self, east_mps: float, north_mps: float, alt_m: FloatArray | None = None
     ) -> SampledTrajectory:
         """Return the same flight with its path-derived attitude angles derived anew in a wind.

@@ -99,8 +99,7 @@ def fit_segments(
     attitude_rad: tuple[FloatArray, FloatArray, FloatArray],
     velocity_enu_mps: Vector | None = None,
 ) -> FloatArray:
-    """Return the polynomial coefficients of each segment, shape (rows, n), or (rows, n, aircraft)
-    for several aircraft with the same times.
+    """Return segments' polynomial coefficients, (rows, n), or (rows, n, aircraft) at common times.
 
     The last sample is a segment of its own; positions are latitude, longitude (deg), altitude (m).
     Without velocities all are straight, and there are `STRAIGHT_ROWS`, else `BENT_ROWS`.

@@ -240,9 +240,7 @@ class ScriptedFleet(Growing, Fleet):
         return np.ascontiguousarray(self._tables[kind].values.T.take(slot, axis=0).T)
 
     def ramp_velocities_mps(self, aircraft: IntArray, time_s: FloatArray) -> FloatArray:
-        """Return the velocities (2, n) to the east and north (m/s) of the given flights, each at
-        its own time; NaN where a flight is on no ramp.
-        """
+        """Return velocities (2, n) east, north (m/s) of flights at own times; NaN if on no ramp."""
         leg, elapsed = self._leg_indices_and_elapsed_s(self._columns[aircraft], time_s)
         velocity = np.full((2, len(leg)), np.nan)
         on = np.flatnonzero(self._kind[leg] == _RAMP)

@@ -164,8 +164,7 @@ def _turn_pieces(manoeuvre: Manoeuvre, speed_mps: float) -> Pieces:
 def _roll_in_pieces(
     angle_rad: float, rate_rad_s: float, roll_rad_s: float, speed_mps: float
 ) -> Pieces:
-    """Return the first pieces of a turn, in which the bank grows at a steady rate, each at its mean
-    turn rate (deg/s).
+    """Return the first pieces of a turn, with steadily growing bank, each at its mean rate (deg/s).
 
     With the bank p t the rate is g tan(p t) / v, and the change of heading after t is
     -g / (v p) ln cos(p t). The first piece is longer where the turn would hardly show in it.
@@ -207,9 +206,7 @@ def _remaining_pieces(pieces: Pieces, elapsed_s: float) -> Pieces:
 
 
 def _mean_rate_of_first_piece(pieces: Pieces, first_s: float, without: float) -> float:
-    """Return the mean rate over the first ``first_s`` of the first piece; ``without`` if no
-    piece.
-    """
+    """Return the mean rate over the first ``first_s`` of the first piece; ``without`` if none."""
     if not pieces:
         return without
     lasts_s, mean, change = pieces[0]

@@ -252,9 +252,7 @@ class Mavlink(Component):
             )
 
     def _manoeuvre_to_follow(self, tick: int, own: Flying) -> Manoeuvre | None:
-        """Return the manoeuvre that turns or climbs the ownship as the autopilot flies, or None if
-        none is needed or one is under way.
-        """
+        """Return the manoeuvre the autopilot flies; None if none is needed or one is under way."""
         flown = self._says.flying
         if tick < self._free_from or not math.isfinite(self._says.position_s):
             return None

@@ -150,9 +150,7 @@ class Process(Component):
         return None if rate is None else ClockSpec(rate, parameters.offset_s)
 
     def offer(self, port: str) -> Any:
-        """Return an offer of detections, maybe with range, without accuracy; None for other
-        ports.
-        """
+        """Return an offer of detections, maybe with range, without accuracy; None for others."""
         return (
             SensorOffer(measures_range=True, resolution_rad=0.0) if port == "detections" else None
         )

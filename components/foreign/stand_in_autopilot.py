@@ -73,8 +73,7 @@ def _passes_near(own: Any, one: Any) -> bool:
 
 
 def answer_and_list_senders(port: int) -> set[Any]:
-    """Answer datagrams at a local port, by a stand-in autopilot for each sender, and return the
-    senders' addresses at the end.
+    """Answer datagrams at a local port by stand-in autopilots; finally return senders' addresses.
 
     It ends by an empty datagram, or when nothing has come for a minute.
     """

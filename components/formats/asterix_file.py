@@ -290,9 +290,7 @@ def read_asterix_plots(
 def _radar_positions(
     radar_of: FloatArray, said: FloatArray, place: tuple[float, float, float] | None
 ) -> FloatArray:
-    """Return the radar's position at each scan, (3, scans); gaps take that of its marker before, of
-    its first marker, or ``place``.
-    """
+    """Return radar positions (3, scans); gaps take the last marker's, the first's, or ``place``."""
     filled = said.copy()
     for radar in np.unique(radar_of):
         mine = np.flatnonzero(radar_of == radar)
@@ -355,9 +353,7 @@ def _aircraft_names(records: list[AsterixRecord]) -> dict[tuple[object, ...], st
 def _time_position_velocity_of(
     record: AsterixRecord, kinds: Sequence[Altitude]
 ) -> tuple[float, ...]:
-    """Return a record's time, latitude, longitude, heights and velocity (east, north, up); NaN for
-    what it does not contain.
-    """
+    """Return time, latitude, longitude, heights, east, north, up velocity; NaN if not recorded."""
     values = record.values
     items = [("lat_deg", "coarse_lat_deg"), ("lon_deg", "coarse_lon_deg")]
     position = [

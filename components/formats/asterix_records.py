@@ -30,8 +30,7 @@ _CLIMB_MPS = 6.25 * FOOT_M / 60.0
 
 
 class _Field(NamedTuple):
-    """How a quantity is stored in ASTERIX: its item and the part of it, the value of one bit, the
-    number of bits, and whether it is signed.
+    """How ASTERIX stores a quantity: item, its part, a bit's value, the number of bits, if signed.
 
     A part of a part is ``CAL/CAL``.
     """

@@ -352,9 +352,7 @@ def _writer_of_columns(names: Collection[str]) -> str | None:
 
 
 def _column_specs(names: list[str], altitude: Altitude | None) -> Mapping[str, ColumnSpec]:
-    """Return the columns to look for, with the given kind of altitude, or if none is given with a
-    second kind where there is one.
-    """
+    """Return columns to look for, with the given altitude kind, or else with a second if any."""
     specs = COLUMNS | {"alt": ColumnSpec(_ORDER[altitude], "m", required=True)}
     there = [name for name in _ORDER[altitude] if name in names]
     if altitude is None and len(there) > 1:

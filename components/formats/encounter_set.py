@@ -94,9 +94,7 @@ class EncounterSet:
     def common_times_and_positions(
         self, index: int
     ) -> Iterator[tuple[FloatArray, FloatArray, FloatArray]]:
-        """Yield for each intruder the times (n,) that both flights have in common, and both
-        positions (3, n) then: north, east, altitude (m).
-        """
+        """Yield by intruder shared times (n,), both positions (3, n): north, east, altitude (m)."""
         first, end = (int(self.first_rows[index + k]) for k in (0, 1))
         own = self.path(first)
         for row in range(first + 1, end):

@@ -266,9 +266,7 @@ def _keep_rows_of_block(table: _Table, block: str | None) -> None:
 
 
 def _check_values(table: _Table) -> None:
-    """Refuse values out of range, times that decrease, and one angle without the other; missing
-    arrival times become the time itself.
-    """
+    """Refuse bad values, decreasing times, lone angles; missing arrival times become the time."""
     numbers = table.numbers
     for name, values in numbers.items():
         low, high = LIMITS.get(name, (0.0, 1.0))

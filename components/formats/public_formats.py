@@ -55,9 +55,7 @@ def set_of_tracks(
 
 
 def read_waypoints_and_damage(path: Path) -> tuple[list[list[tuple[str, Track]]], dict[int, str]]:
-    """Read a file of waypoints; returns the named tracks of each encounter, and by index what is
-    wrong with damaged encounters.
-    """
+    """Read waypoints; return encounters' named tracks and, by index, the damaged ones' faults."""
     try:
         content = read_input_bytes(path)
     except InputFileError as error:

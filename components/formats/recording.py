@@ -26,9 +26,7 @@ Samples = dict[str, FloatArray]
 
 
 class ReadingNotes:
-    """Notes on what was assumed, reordered or left out in reading a file: harmless ones, and
-    warnings of what changes the flights.
-    """
+    """Notes on reading: what was assumed, reordered, left out; and warnings of changed flights."""
 
     def __init__(self) -> None:
         self.harmless: list[str] = []

@@ -86,9 +86,7 @@ _MISSING = frozenset(
 
 
 def is_missing(cell: str) -> bool:
-    """Return whether a cell is empty or a word for no value, such as nan, none, n/a, - or
-    ground.
-    """
+    """Return whether a cell is empty or a word for none, such as nan, none, n/a, - or ground."""
     return cell.strip().lower() in _MISSING
 
 

@@ -156,9 +156,7 @@ class SampleTable:
         return self._aircraft[name]
 
     def _read_unusual_cell(self, line: int, quantity: str, cell: str) -> float | None:
-        """Return the value of a cell that is no plain number within its limits: NaN for a missing
-        one, None after adding a problem.
-        """
+        """Return an unusual cell's value: NaN if missing, or None after adding a problem."""
         if quantity in self._optional:
             return math.nan
         if self._gaps and is_missing(cell):

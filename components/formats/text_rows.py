@@ -214,9 +214,7 @@ def read_content(path: Path, problems: Problems) -> bytes:
 
 
 def text_of(data: bytes, problems: Problems, needed: str = _TRAFFIC) -> str:
-    """Return bytes decoded as UTF-8, UTF-16 with byte-order mark, or Latin-1; an error if
-    binary.
-    """
+    """Return bytes decoded as UTF-8, UTF-16 with byte-order mark, or Latin-1; error if binary."""
     text = _decode(data)
     if text is None:
         problems.fail(f"this is a binary file: {needed} is needed")

@@ -111,9 +111,7 @@ def read_track_csv(path: Path, at: tuple[float, float] | None = None) -> Tracks:
 
 
 def _project_to_plane(samples: FloatArray, origin: tuple[float, float]) -> Track:
-    """Return a track given by latitude, longitude and height (ft) as north, east and height (m) in
-    the plane that touches at the origin.
-    """
+    """Return latitude, longitude, height (ft) as north, east, height (m) in the tangent plane."""
     time_s, lat, lon, alt_ft = samples
     north, east, _ = line_of_sight_ned(*origin, 0.0, lat, lon, np.zeros_like(lat))
     return time_s, north, east, alt_ft * FOOT_M
@@ -218,9 +216,7 @@ def read_track_matrices(path: Path) -> Tracks:
 
 
 def _sort_by_time(path: Path, name: str, samples: FloatArray, notes: list[str]) -> FloatArray:
-    """Return samples (columns, n) in order of time, each once; two positions at one time raise
-    EncounterSetError.
-    """
+    """Return samples (columns, n) by time, each once; EncounterSetError if two differ at a time."""
     name = name or "the track"
     order = np.argsort(samples[0], kind="stable")
     if (order[1:] < order[:-1]).any():

@@ -196,8 +196,7 @@ class Fusion(Component):
         arrivals: dict[str, Arrivals],
         entries: dict[str, IntArray],
     ) -> tuple[FusedDetections, IntArray]:
-        """Return the fused rows, and the indices (quantities, fused) of the detections from which
-        each fused detection takes its values.
+        """Return fused rows, and detections' indices (quantities, fused) that give their values.
 
         These are numbered over the arrivals, one after the other; -1 is none.
         """
@@ -291,8 +290,7 @@ class _Entries:
         self._entries = start
 
     def best_sensor_and_entry(self, ranked: Sequence[int]) -> tuple[IntArray, IntArray | None]:
-        """Return for each row the sensor and the entry that it takes values from, -1 for none; a
-        later sensor in ``ranked`` wins.
+        """Return by row the sensor and entry it takes values from, or -1; later in ``ranked`` wins.
 
         The entries are None where they are those of the only message, one after the other.
         """

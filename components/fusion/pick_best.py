@@ -51,9 +51,7 @@ class PickBest(Fusion):
         ]
 
     def window_s(self) -> Any:
-        """Return ``coincidence_s``, the age (s) up to which detections can be fused with new
-        ones.
-        """
+        """Return ``coincidence_s``, the age (s) up to which detections fuse with new ones."""
         return self.p.coincidence_s
 
     def warnings(self) -> list[str]:

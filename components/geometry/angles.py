@@ -303,9 +303,7 @@ def _two_difference(lon1: FloatArray, lon2: FloatArray) -> tuple[FloatArray, Flo
 
 
 def _wrap_sum(total: FloatArray, low: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return total + low wrapped into [-180, 180) degrees, and total less its nearest whole
-    turns.
-    """
+    """Return total + low wrapped to [-180, 180) degrees, and total less its nearest whole turns."""
     rest = total - 360.0 * np.rint(total * (1.0 / 360.0))
     difference = rest + low
     over = (difference >= 180.0) | (difference < -180.0)

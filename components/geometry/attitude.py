@@ -139,8 +139,7 @@ def relative_attitude(
     target_pitch_rad: npt.ArrayLike,
     target_roll_rad: npt.ArrayLike,
 ) -> Vector:
-    """Return the target's yaw, pitch and roll relative to the line of sight, angle by angle (thesis
-    eq. 6).
+    """Return target yaw, pitch, roll relative to the line of sight, angle by angle (thesis eq. 6).
 
     A small-angle form of `line_of_sight_in_target_axes`, which has the same arguments: the sign of
     the elevation is right only for a receding target, and roll shares its axis with elevation only
@@ -260,9 +259,7 @@ def components_in_turned_axes(
 
 
 def common_shape_and_arrays(**values: npt.ArrayLike) -> tuple[tuple[int, ...], list[FloatArray]]:
-    """Check named arguments and return their common shape, and each as a float array with at least
-    one axis.
-    """
+    """Check named arguments; return the common shape and each as float array, at least 1-D."""
     arrays = {name: check_squarable(name, value) for name, value in values.items()}
     shape = common_shape(**arrays)
     return shape, [a if a.ndim else a.reshape(1) for a in arrays.values()]

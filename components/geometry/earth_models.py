@@ -156,8 +156,7 @@ def daidalus_sphere_offsets(
     lon2: FloatArray,
     alt2: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return north, east and up offsets (m) of point 2 from point 1 in the plane of `east_north_m`,
-    accurate also close by.
+    """Return north, east, up (m) of point 2 from 1 in `east_north_m`'s plane, accurate also nearby.
 
     Beyond a quarter of the way around the Earth the projection comes back: what is there seems
     nearer than it is.
@@ -337,8 +336,7 @@ class LineOfSight:
         return self._in_ned(coordinates, validate=True)
 
     def from_ownship(self, own: Any, other: Any) -> SeenFromOwnship:
-        """Return azimuth, elevation and range of targets from the ownship in NED, and azimuth and
-        elevation in its body axes, without checks.
+        """Return targets' azimuth, elevation, range (NED), azimuth, elevation (body), unchecked.
 
         Both have ``lat_deg``, ``lon_deg`` and ``alt_m``, the ownship ``yaw_rad``, ``pitch_rad`` and
         ``roll_rad`` as well: finite doubles of one axis up that broadcast, the targets' of the

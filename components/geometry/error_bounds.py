@@ -114,9 +114,7 @@ def flat_earth_error_bounds(envelope: Envelope) -> Interval | None:
 
 
 def local_radii_error_bounds(envelope: Envelope, range_m: float) -> Interval | None:
-    """Return the largest direction error (rad) and relative range error of the local-radii model up
-    to a range, or None if no bound is known.
-    """
+    """Return local radii's largest direction (rad) and relative range error to a range, or None."""
     low_alt = min(envelope.own_alt_m[0], envelope.target_alt_m[0])
     high_alt = max(envelope.own_alt_m[1], envelope.target_alt_m[1], 0.0)
     if range_m > 2.0 * _LARGEST_SINE * (_M_EQUATOR + low_alt):
@@ -176,9 +174,7 @@ def local_radii_error_bounds(envelope: Envelope, range_m: float) -> Interval | N
 
 
 def geodesic_error_bounds(envelope: Envelope) -> Interval | None:
-    """Return the largest direction error (rad) and the largest relative range error of the geodesic
-    model, or None if no bound is known.
-    """
+    """Return the geodesic model's largest direction (rad), relative range error, or None."""
     low_alt = min(envelope.own_alt_m[0], envelope.target_alt_m[0], 0.0)
     rho = _M_EQUATOR + low_alt
     range_m = envelope.range_max_m
@@ -301,9 +297,7 @@ class ErrorBound:
 
     @property
     def elevation_rad(self) -> float:
-        """Bound on the elevation error (rad) in body axes, which is that of the direction, as a
-        rolled aircraft reads it.
-        """
+        """Bound on elevation error (rad) in body axes: the direction's, as aircraft may roll."""
         return self.direction_rad
 
     @property
@@ -354,8 +348,7 @@ def error_bound(earth: str, envelope: Envelope, attitude: str = "exact") -> Erro
 def max_true_range_m(
     earth: str, reach_m: float, own_lat_deg: Interval, own_alt_m: Interval
 ) -> float:
-    """Return a true range (m) beyond which no target appears to be within ``reach_m`` by a model of
-    the Earth; infinite if there is none.
+    """Return a true range (m) beyond which models put no target within ``reach_m``; or infinity.
 
     With a relative error e of the range, proven for all targets that seem to be in reach, these
     are within R / (1 - e).
@@ -382,9 +375,7 @@ def attitude_error_bound_rad(pitch_rad: float, roll_rad: float) -> float:
 
 
 def azimuth_error_bound_rad(direction_rad: float, steepest_rad: float) -> float:
-    """Return a bound (rad) on the azimuth error of a direction with an error of ``direction_rad``,
-    at elevations up to the steepest.
-    """
+    """Return an azimuth error bound (rad) for error ``direction_rad``, up to steepest elevation."""
     if direction_rad == 0.0:
         return 0.0
     if direction_rad + steepest_rad >= 0.5 * math.pi:

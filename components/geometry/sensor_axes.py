@@ -165,8 +165,7 @@ def body_angles_of_offsets(
     pitch_rad: FloatArray,
     roll_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return azimuth and elevation (rad) in the ownship's body axes of what lies at some north,
-    east, up offsets, without checks.
+    """Return body azimuth, elevation (rad) of north, east, up offsets from the ownship, unchecked.
 
     As `body_angles_of_sight_line`, to the last digit or two, at a third to half of its cost: the
     direction need not be taken apart into angles first. All are contiguous arrays of finite

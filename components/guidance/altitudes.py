@@ -37,9 +37,7 @@ class Altitudes:
         self._choose_examined_altitudes(math.inf if self.from_now else self.lookahead_s, step)
 
     def find_conflicts(self, intruder: State, detector: Detector) -> "AltitudeConflicts":
-        """Return the conflicts of the flights to all altitudes with a volume around one intruder of
-        each ownship, given as a state of (n, 1).
-        """
+        """Return the flights' conflicts with a volume around one intruder each, a (n, 1) state."""
         return AltitudeConflicts(self, intruder, detector)
 
     def _compute_flights(self, acceleration: float, rate: float) -> None:
@@ -101,9 +99,7 @@ class Altitudes:
         return np.take_along_axis(chosen, self._stands_for, axis=1)
 
     def straight_flight_from(self, time_s: FloatArray) -> State:
-        """Return straight flights by the position and velocity, at a time, of the flights to
-        examined altitudes, as states run back to time 0.
-        """
+        """Return straight flights by position and velocity at a time, as states run back to 0 s."""
         own = self.own
         values = self._level_m
         if self.instantaneous:
@@ -146,9 +142,7 @@ class AltitudeConflicts:
         self._store_inside_at_seconds(np.ceil(t2), t3 + 1.0)
 
     def _straight_flight_span(self, begin_s: FloatArray, whole: bool) -> Span:
-        """Return when straight flights, with the motion at ``begin_s``, are inside the volume: from
-        then on, or with ``whole`` from time 0 on.
-        """
+        """Return when straight flights from ``begin_s`` (``whole``: from 0 s) are in the volume."""
         if whole:
             flight, begin_s = self._altitudes.straight_flight_from(begin_s), np.zeros(begin_s.shape)
         else:

@@ -18,7 +18,7 @@ from components.guidance.intervals import (
     Interval,
     is_same_value,
     paint_bands,
-    rename_to_recovery,
+    rename_none_to_recovery,
 )
 from components.guidance.manoeuvre_kinds import ManoeuvreKind, manoeuvres_of_kind
 from components.guidance.recovery import Recovery, find_recoveries, recovery_cylinder
@@ -121,9 +121,7 @@ def _edge_as_direction(own_value: float, edge: float, none: float) -> float:
 
 
 def distance_to_edge(own_value: float, edge: float, cyclic: bool) -> float:
-    """Return how far an edge is from the own value, in their unit; if `cyclic`, both are angles in
-    radians and the shorter way round the circle counts.
-    """
+    """Return how far an edge is from the own value, same unit; if `cyclic`, rad, shorter way."""
     way = abs(edge - own_value)
     return min(way, FULL_TURN - way) if cyclic and math.isfinite(way) else way
 
@@ -309,4 +307,6 @@ class _Painter:
             layers.append(("RECOVERY", ways, False))
         line = paint_bands(layers, least, most)
         result = Guidance(own_value, line, recovery, line)
-        return result._replace(bands=rename_to_recovery(line)) if result.has_recovery else result
+        return (
+            result._replace(bands=rename_none_to_recovery(line)) if result.has_recovery else result
+        )

@@ -41,9 +41,7 @@ def is_same_value(one: float, other: float) -> bool:
 
 
 def limits_of(name: str, own_value: FloatArray, values: Any) -> tuple[FloatArray, FloatArray]:
-    """Return the least and the largest value of one kind of manoeuvre, within what the
-    configuration allows around the own value.
-    """
+    """Return least and largest values of a manoeuvre kind, as configured around the own value."""
     below, above = values[f"below_relative_{name}"], values[f"above_relative_{name}"]
     least = np.full(np.shape(own_value), float(values[f"min_{name}"]))
     most = np.full(np.shape(own_value), float(values[f"max_{name}"]))
@@ -111,7 +109,7 @@ def paint_bands(
     return join_neighbours(bands)
 
 
-def rename_to_recovery(bands: list[Band]) -> list[Band]:
+def rename_none_to_recovery(bands: list[Band]) -> list[Band]:
     """Return the bands with NONE called RECOVERY, equal neighbours joined."""
     return join_neighbours(
         Band(low, high, "RECOVERY" if region == "NONE" else region) for low, high, region in bands

@@ -41,9 +41,7 @@ class Steps(NamedTuple):
         return not self.step_time_s.any()
 
     def find_conflicts(self, intruder: State, detector: Detector) -> "StepConflicts":
-        """Return the conflicts of the manoeuvres with a volume around one intruder of each ownship,
-        given as a state of (n, 1).
-        """
+        """Return manoeuvres' conflicts with a volume around one intruder each, a (n, 1) state."""
         return StepConflicts(self, intruder, detector)
 
 

@@ -17,7 +17,7 @@ from components.guidance.intervals import (
     Band,
     is_same_value,
     join_neighbours,
-    rename_to_recovery,
+    rename_none_to_recovery,
 )
 from components.guidance.recovery import Recovery
 
@@ -62,7 +62,7 @@ class BandMemory:
             line = [b._replace(region="NONE") if b.region == "RECOVERY" else b for b in line]
         line = join_neighbours(line)
         recovers = recovery is not None and recovery.time_s >= 0.0
-        bands = rename_to_recovery(line) if recovers else line
+        bands = rename_none_to_recovery(line) if recovers else line
         if self._persists:
             self._remember(bands, own_value)
         return bands
@@ -285,9 +285,7 @@ class ResolutionMemory:
         return next((i for i in reversed(free) if is_same_value(bands[i].high, edge)), -1)
 
     def _is_connected_without_red(self, start: int, end: int, bands: list[Band]) -> bool:
-        """Return whether one band can be reached from another on the preferred side without
-        crossing a red one.
-        """
+        """Return whether a band is reached from another on the preferred side, crossing no red."""
         if start < 0:
             return False
         at = start

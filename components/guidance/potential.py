@@ -50,8 +50,7 @@ def conflict_mask(others: Others, kept: KeptApart) -> BoolArray:
 
 
 def may_resume(others: Others, own_mps: FloatArray, kept: KeptApart) -> BoolArray:
-    """Return a mask (n, others), True for others that move away, outside the radius, and not close
-    by on nearly one's own track.
+    """Return which (n, others) move away, outside the radius, not close on nearly one's own track.
 
     `own_mps` is one's own velocity (2, n).
     """

@@ -86,17 +86,13 @@ class Regions:
         return self._conflicts[key]
 
     def has_region_and_concerned(self, region: str) -> tuple[BoolArray, list[Concerned]]:
-        """Return a mask (n,) of ownships with an intruder for which a level has the region, and the
-        intruders whose volumes count.
-        """
+        """Return which ownships (n,) have a level's region, and intruders whose volumes count."""
         if region not in self._concerned:
             self._concerned[region] = self._find_concerned(region)
         return self._concerned[region]
 
     def has_region_and_safe_values(self, region: str) -> tuple[BoolArray, BoolArray]:
-        """Return a mask (n,) of ownships with an intruder for which a level has the region, and a
-        mask (n, k) of the values that are safe.
-        """
+        """Return which ownships (n,) have a level's region, and which values (n, k) are safe."""
         known, concerned = self.has_region_and_concerned(region)
         clear = self._kind.there.copy()
         for one in concerned:

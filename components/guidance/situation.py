@@ -62,9 +62,7 @@ def overlaps_time(span: Span, begin_s: Any, end_s: Any) -> BoolArray:
 
 
 def contains_instant(span: Span, from_s: Any, begin_s: Any, end_s: Any) -> BoolArray:
-    """Return a mask, True where the examined time is a single instant, ends at ``from_s``, and lies
-    in the span.
-    """
+    """Return which examined times (mask) are an instant, end at ``from_s``, lie in the span."""
     alone = np.asarray((begin_s == end_s) & (from_s == end_s))
     if not alone.any():
         return alone

@@ -16,8 +16,7 @@ def line_of_sight_errors(
     attitude: tuple[float, float, float],
     given: tuple[float, float, float],
 ) -> tuple[float, float, float, float]:
-    """Return the absolute errors of a given line of sight in direction, azimuth and elevation (rad)
-    and in range (m), against one at many digits.
+    """Return absolute errors against many digits: direction, azimuth, elevation (rad), range (m).
 
     Through Earth-centred coordinates, the textbook way that loses digits in doubles.
 

@@ -288,9 +288,7 @@ class ScanningLaser(SweepingSensor):
         return Look(detected, above_db, extras, {"amplitude": strength})
 
     def _extra_columns(self, cells: Cells, look: Look) -> Mapping[str, Any]:
-        """Return the columns recorded with a detection, without the probability of detection, which
-        only the simulation knows.
-        """
+        """Return a detection's recorded columns, without the simulation's detection probability."""
         extras = dict(super()._extra_columns(cells, look))
         extras.pop("detection_probability", None)
         return extras

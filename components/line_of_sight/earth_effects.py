@@ -56,9 +56,7 @@ class Limb(Effect[Hides]):
         return Verdict(horizon, f"[terrain] horizon is {str(horizon).lower()}")
 
     def build(self, block: Any) -> Hides:
-        """Return a function giving the mask of targets behind the Earth's horizon; absent:
-        False.
-        """
+        """Return a function giving a mask of targets behind the Earth's horizon; absent: False."""
         terrain = terrain_section(block)
         surface_m = terrain.height_m or 0.0
         return _hide_only_present(

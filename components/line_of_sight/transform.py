@@ -56,9 +56,7 @@ QUANTITIES = (
 def measured_lines_of_sight(
     block: Component, wake: Wake, reference: Component
 ) -> dict[str, AnyArray]:
-    """Run the transform on a wake and return direction, azimuth, elevation and range in body axes,
-    (rows, all targets of the roster).
-    """
+    """Transform a wake; return body direction, azimuth, elevation, range, (rows, all targets)."""
     seen: Any = block.run(wake)
     return {
         "direction": spread_over_roster(

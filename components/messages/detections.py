@@ -215,8 +215,7 @@ _OFTEN_S = 2.0
 def range_and_report_interval_pairs(
     period_s: float, promises: Iterable[tuple[float, float]] = ()
 ) -> tuple[tuple[float, float], ...]:
-    """Return pairs (range in m, time in s): a target up to that range is reported again within that
-    time in 19 of 20 cases.
+    """Return (range m, time s) pairs: up to that range 19 of 20 are reported again within the time.
 
     `promises` are those that it makes whatever its looks. Of a sensor that looks often nothing is
     said of its looks, so that replicas may differ in their rates.
@@ -236,9 +235,7 @@ def offers_of_fused_sensors(producers: Iterable[Any]) -> dict[str, Any]:
 
 
 def joined_names_if_all_rangeless(producers: Iterable[Any]) -> str:
-    """Return the sensors' names joined by `and` if none of them measures range; an empty string if
-    one does or none is known.
-    """
+    """Return sensor names joined by `and` if known and none measures range; else empty string."""
     offers = offers_of_fused_sensors(producers)
     if not offers or any(
         not isinstance(one, SensorOffer) or one.measures_range for one in offers.values()

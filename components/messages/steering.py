@@ -150,9 +150,7 @@ class Manoeuvres(Message):
 
     @classmethod
     def make_initial(cls, values: Mapping[str, object]) -> Self:
-        """Raise ValueError: a scene cannot state a manoeuvre before the first, only ``holds =
-        'nothing'``.
-        """
+        """Raise ValueError: before a first manoeuvre a scene may only say ``holds = 'nothing'``."""
         raise ValueError("no manoeuvre can be written in a scene; allowed: 'nothing'")
 
 

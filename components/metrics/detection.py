@@ -90,7 +90,9 @@ class FirstDetection(TargetMetric):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return by replica whether, when (s), at what range (m) each sensor first reports."""
+        """Return by replica, for each sensor: whether it reports (1 or 0), when (s) and at what
+        range (m) first, and whether that is cut off (``at the start``, ``never``, else None).
+        """
         values: dict[str, AnyArray] = {}
         for name in self.names:
             time_s, range_m = first_report_time_and_range(group, name, self.p.target)

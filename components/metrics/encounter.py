@@ -161,9 +161,7 @@ class ClosestApproach(_Encounter):
         return results
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return each replica's closest approach (m), its time (s), and how long before it the
-        target was detected and declared.
-        """
+        """Return replicas' closest approach (m), time (s), how long detected, declared before."""
         names, each = self.evaluate_each_flight(
             group, make_run_by_run_reader(_closest_approach_of_first), to_the_end=True
         )
@@ -259,7 +257,7 @@ class WellClear(_Encounter):
         return values
 
 
-def _upstream_blocks_that_may_fail(scene: Scene, block: str) -> list[str]:
+def _block_and_upstream_that_may_fail(scene: Scene, block: str) -> list[str]:
     """Return the blocks that may fail among a block and all it receives from, even indirectly.
 
     What steers the traffic is not: no alert is made of it.
@@ -342,7 +340,9 @@ class AlertTimes(FlownMetric):
         self._blocks = self.select_on_platform(blocks_recording(scene, "alerts"))
         #: Which blocks may be out behind each of them that has any.
         self._behind = {
-            name: of for name in self._blocks if (of := _upstream_blocks_that_may_fail(scene, name))
+            name: of
+            for name in self._blocks
+            if (of := _block_and_upstream_that_may_fail(scene, name))
         }
 
     def results(self) -> list[Result]:

@@ -37,9 +37,7 @@ _SCORES: dict[str, FloatArray] = {
 
 
 class ManoeuvresTold(NamedTuple):
-    """Manoeuvres in order of arrival: when each was sent and when it arrived (s), the steered
-    aircraft (-1: the ownship), and its fields.
-    """
+    """Manoeuvres by arrival: when sent, arrived (s), steered aircraft (-1: ownship), fields."""
 
     told_s: FloatArray
     came_s: FloatArray

@@ -123,9 +123,7 @@ def _expected_share(
     one: tuple[ClockSpec, Fraction],
     other: tuple[ClockSpec, Fraction],
 ) -> float | None:
-    """Return the expected share of one clock's scans that coincide with the other's; None if the
-    run's length is not known.
-    """
+    """Return a clock's expected share of scans that coincide; None if the run length is unknown."""
     (own, delay_s), (theirs, other_delay_s) = one, other
     if any(clock.jitter_s or clock.rate_error_ppm for clock in (own, theirs)):
         # How long a run is that a block may end is not known before it.
@@ -193,8 +191,7 @@ def coincidence_share(
     before_s: Fraction = Fraction(0),
     after_s: Fraction = Fraction(0),
 ) -> Fraction:
-    """Return the long-run share of a clock's scans, at t, for which the other scans between t -
-    before_s and t + after_s.
+    """Return the long-run share of scans, at t, with others between t - before_s and t + after_s.
 
     That is one at t - before_s ≤ t' ≤ t + after_s, both bounds inclusive and 0 or more.
     """

@@ -129,17 +129,13 @@ class FlightsTogether:
     def horizontal_and_vertical_m(
         self, flight: IntArray, time_s: FloatArray
     ) -> tuple[FloatArray, ...]:
-        """Return horizontal distance and altitude difference of flights (n,), each at its own time,
-        m; infinite if one is absent.
-        """
+        """Return horizontal, vertical distance (n,), each at its time, m; infinite if absent."""
         return self.range_horizontal_vertical_at_m(flight, time_s)[1:]
 
     def range_horizontal_vertical_at_m(
         self, flight: IntArray, time_s: FloatArray
     ) -> tuple[FloatArray, ...]:
-        """Return slant range, horizontal distance and altitude difference of flights (n,), each at
-        its own time (n,), m.
-        """
+        """Return slant range, horizontal distance, altitude difference (n,) at own times, m."""
         blocks = []
         for first in range(0, len(flight), CELLS_AT_ONCE):
             some = flight[first : first + CELLS_AT_ONCE], time_s[first : first + CELLS_AT_ONCE]
@@ -150,8 +146,7 @@ class FlightsTogether:
 def flight_times_first_within_s(
     flights: Sequence[RelativeFlight], *limits_m: tuple[float, float]
 ) -> FloatArray:
-    """Return the first time (s) at which each target is within each (horizontal, vertical)
-    distance, (flights, limits).
+    """Return when (s) targets first meet each (horizontal, vertical) limit, (flights, limits).
 
     NaN where a target never is. Flights that look between samples are asked by
     `components.well_clear.separation`, with its error bound; others at their times only.
@@ -248,8 +243,7 @@ def loss_nmac_and_start_times_s(
 def run_times_first_within_s(
     limits_m: Sequence[tuple[float, float]], runs: Sequence[list[RelativeFlight]]
 ) -> FloatArray:
-    """Return the first time (s) at which any target of a run is within each (horizontal, vertical)
-    distance, (limits, runs).
+    """Return when (s) any target is first within each (horizontal, vertical) limit, (limits, runs).
 
     (limits, runs); NaN for never. Limits fall.
     """
@@ -269,8 +263,7 @@ def _states_of_some(at: Any, some: IntArray, flight: IntArray, time_s: FloatArra
 def displacements_around(
     flights: Sequence[RelativeFlight], time_s: FloatArray, base_s: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the displacements of ownships and targets over an interval around each time, north and
-    east, (2, flights), m.
+    """Return own and target displacements over a span at each time: north, east, (2, flights), m.
 
     From `base_s` before it to as long after it, as far as both are there; (north, east) in the
     ownship's level plane then, each (2, flights).
@@ -298,8 +291,7 @@ _BASE_S = 0.5
 
 
 def nearest_course_and_bearing_deg(runs: Sequence[list[RelativeFlight]]) -> FloatArray:
-    """Return relative course and bearing of each run's nearest intruder at its closest approach,
-    (2, runs), degrees.
+    """Return nearest intruders' relative course, bearing at closest approach, (2, runs), degrees.
 
     Course: the intruder's less the ownship's. Bearing from where the intruder closes in, clockwise
     from the ownship's course: opposite to its velocity relative to the ownship. NaN where they

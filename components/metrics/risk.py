@@ -104,9 +104,7 @@ class Mitigated(FlownMetric):
     def event_flags(
         self, group: Group, *, steered: bool, some: IntArray | None = None
     ) -> dict[str, AnyArray]:
-        """Return the flags (1.0 or 0.0) of loss of well clear and NMAC in some replicas, flown as
-        steered or without manoeuvres.
-        """
+        """Return flags (1.0, 0.0) of lost well clear, NMAC in replicas, steered or unmanoeuvred."""
         lost_s, collision_s, _ = self.evaluate_flights(
             group, self.p.loss_nmac_and_start_times_s, steered=steered, some=some
         )
@@ -217,9 +215,7 @@ class Severity(FlownMetric):
         ]
 
     def measure(self, group: Group) -> Mapping[str, AnyArray]:
-        """Return each replica's largest severity (percent) and probability of an NMAC; NaN if no
-        target is ever present with the ownship.
-        """
+        """Return replicas' largest severity (percent), NMAC probability; NaN without a target."""
         values = self.evaluate_flights(
             group, make_run_by_run_reader(self._severity_and_collision), to_the_end=True
         )

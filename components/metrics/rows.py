@@ -161,9 +161,7 @@ def pick_target_by_replica(values: AnyArray, target: IntArray) -> AnyArray:
 
 
 def pick_target_columns(values: AnyArray, target: IntArray) -> AnyArray:
-    """Return the columns of the given targets for all replicas, (replicas, given targets); NaN or 0
-    where a target is -1.
-    """
+    """Return given targets' columns, (replicas, given targets); NaN or 0 where a target is -1."""
     return _append_missing(values)[:, target]
 
 

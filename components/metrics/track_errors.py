@@ -88,9 +88,7 @@ class ErrorsByRange(PlatformTracks):
         return results
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return each replica's track errors at every range, whether it is tracked there, and the
-        range of the first track.
-        """
+        """Return replicas' track errors by range, whether tracked there, first track's range."""
         values = {result.name: np.full(len(group), np.nan) for result in self.results()}
         columns: Any = group.tables[_TABLE]
         kept = is_confirmed_or_coasted(columns["track_status"]) & np.asarray(
@@ -145,8 +143,7 @@ class ErrorsByRange(PlatformTracks):
     def _row_errors_and_targets(
         self, columns: Any, rows: IntArray, own: Any, targets: Sequence[Any]
     ) -> tuple[dict[str, FloatArray], IntArray, IntArray, float]:
-        """Return the errors of rows by name, the rows that belong to a target, the target of each,
-        and the first one's range (m).
+        """Return row errors by name, targets' rows, the target of each, and the first's range (m).
 
         A row is of the target that is nearest to it.
         """

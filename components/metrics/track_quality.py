@@ -123,9 +123,7 @@ class AgeOfInformation(TargetMetric):
         }
 
     def analytic_answers(self, scene: Scene) -> Mapping[str, float]:
-        """Return the expected mean and 95th percentile of the age (s) for a single sensor that
-        detects in every scan that is not lost.
-        """
+        """Return the age's expected mean, 95th percentile (s): one sensor, only lost scans miss."""
         feed = feed_of_only_sensor(scene, self.fusion)
         if feed is None:
             return {}
@@ -217,9 +215,7 @@ class TrackUpdates(TargetMetric):
         return [interval, p95, Result("track_continuity", FRACTION, said), breaks]
 
     def measure(self, group: Group) -> Mapping[str, FloatArray]:
-        """Return each replica's mean and 95th percentile of the update interval (s), continuity
-        (share of time) and number of breaks.
-        """
+        """Return by replica mean, 95th percentile update interval (s), continuity share, breaks."""
         columns: Any = group.tables["tracks"]
         lines = _Lines(columns, _has_new_measurement(columns, is_of_target(columns, self.p.target)))
         count = len(group)

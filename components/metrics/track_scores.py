@@ -24,9 +24,7 @@ _SETS = (
 
 
 class SetDistance(NamedTuple):
-    """OSPA distance, between 0 and the cut-off, and GOSPA distance with its parts for localisation,
-    missed and false tracks, m.
-    """
+    """OSPA distance, 0 to cut-off, and GOSPA with localisation, missed and false track parts, m."""
 
     ospa_m: float
     gospa_m: float
@@ -36,9 +34,7 @@ class SetDistance(NamedTuple):
 
 
 def ospa_and_gospa(distance_m: FloatArray, cutoff_m: float, order: float = 2.0) -> SetDistance:
-    """Return the OSPA and GOSPA distances for distances (tracks, truths) with a cut-off, both in m;
-    `order` is their exponent p, 1 or more.
-    """
+    """Return OSPA, GOSPA of distances (tracks, truths) with cut-off, m; `order` is p, 1 or more."""
     tracks, truths = distance_m.shape
     if tracks == 0 and truths == 0:
         return SetDistance(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -170,9 +166,7 @@ class TrackTally:
         covered_s: Mapping[str, float],
         duration_s: float,
     ) -> dict[str, float]:
-        """Return the scores by result name, given when each target was first detected and first in
-        coverage (by name, s).
-        """
+        """Return scores by name, from targets' first detection and coverage times (by name, s)."""
         results = self._error_results()
         sets = np.array(self.sets).reshape(-1, len(_SETS))
         results |= {name: mean_or_nan(sets[:, i]) for i, name in enumerate(_SETS)}

@@ -180,9 +180,7 @@ class Tracking(PlatformTracks):
         return outcome
 
     def _is_of_wanted_block(self, column: Any, scene: Scene) -> Any:
-        """Return a mask of the rows (True) of the wanted block; by default of the blocks whose
-        output goes to no other recorded block.
-        """
+        """Return which rows are of the wanted block, by default of any feeding no recorded one."""
         names = self.blocks_on_board(column.names)
         fed = {
             source for source, target in scene.graph.edges if source in names and target in names

@@ -55,8 +55,7 @@ def displaced_lat_lon_alt(
     east_m: ArrayLike,
     down_m: ArrayLike,
 ) -> tuple[Any, Any, Any]:
-    """Return the latitude, longitude and altitude of positions displaced by offsets (each at most
-    100 km) in their own north-east-down axes.
+    """Return latitude, longitude, altitude displaced by own north-east-down offsets up to 100 km.
 
     The displacement is an arc along a sphere with the local radii of the ellipsoid, so it also
     works across a pole. Against a straight displacement in the tangent plane an error of 10 m
@@ -269,9 +268,7 @@ class NavigationReport(_Navigation[ReportTransform]):
 def add_angles_in_believed_ned(
     detections: Detections, targets: RelativeTargets, rows: IntArray
 ) -> Detections:
-    """Return detections with azimuth from north and elevation over the horizon added, by the
-    believed attitude; unchanged without a pose.
-    """
+    """Return detections with believed NED azimuth and elevation added; unchanged without a pose."""
     own = detections.pose_columns()
     if not own:
         return detections

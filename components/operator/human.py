@@ -44,9 +44,7 @@ class _Alert(NamedTuple):
 
 
 class Taken(NamedTuple):
-    """When a decision was accepted, when its turn or climb ends, and when an earlier command that
-    it replaces was accepted, s.
-    """
+    """When a decision was accepted, its turn or climb ends, and a replaced one was accepted, s."""
 
     time_s: float
     ends_s: float = math.nan  # When a turn or a climb is flown; NaN for others
@@ -113,9 +111,7 @@ class Console(Component):
         return taken
 
     def _apply_alerts_until_tick(self, came: list[Arrivals], row: int, until: int | None) -> int:
-        """Update the active alerts from row `row` up to tick `until` (None: to the end) and return
-        the next row.
-        """
+        """Update active alerts from row `row` to tick `until` (None: end); return the next row."""
         for arrived in came:  # one wire
             alerts: AlertLevels = arrived.message
             rows = len(alerts)

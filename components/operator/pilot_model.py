@@ -73,9 +73,7 @@ class Draws(NamedTuple):
 def commanded_change_out_of_band(
     changes: tuple[float, float], turns: bool, draws: Draws | None, goes_beyond: bool = True
 ) -> float:
-    """Return the change of track (rad, positive right) or altitude (m, positive up) that a pilot
-    commands to leave the band (low, high).
-    """
+    """Return the track (rad, positive right) or altitude (m, up) change to leave (low, high)."""
     low, high = changes
     if math.isinf(low) and math.isinf(high):
         return 0.0

@@ -102,8 +102,7 @@ def false_alarm_direction(
     lowest_elevation_rad: float,
     highest_elevation_rad: float,
 ) -> tuple[Any, Any]:
-    """Return azimuths and elevations of false alarms, uniform over the picture, from uniform
-    numbers.
+    """Return false alarms' azimuths and elevations, uniform over the picture, from uniform numbers.
 
     Evenly over azimuth and elevation, as pixels are; not over solid angle.
     """

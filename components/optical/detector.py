@@ -185,9 +185,7 @@ def threshold_deviations(false_alarms: float, places: int) -> float:
 
 
 class _OneLook:
-    """Stand-in for the cells of one look: a level aircraft at a known range, aspect and contrast at
-    the ownship's altitude.
-    """
+    """A look's stand-in for cells: level aircraft, known range, aspect, contrast, own altitude."""
 
     def __init__(self, craft: Aircraft, range_m: float, aspect_rad: float) -> None:
         self.roster = Roster.from_pairs([("calibrate", craft)])

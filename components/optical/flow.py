@@ -164,8 +164,7 @@ _NOTHING = Flow(math.nan, math.nan, math.nan)
 def spot_flow(
     earlier: FloatArray, later: FloatArray, spot: Spot, sought: BoolArray, noise: float
 ) -> Flow:
-    """Return the displacement (x, y) of a spot from the earlier picture to the later one, and its
-    standard deviation, pixels.
+    """Return a spot's move (x, y) from earlier to later picture and its standard deviation, pixels.
 
     Of both pictures the share of each pixel that the target covers is worked out, from its level
     and from the background, as it is beside the target; so the flow is the target's, whatever the
@@ -318,9 +317,7 @@ def _moment_matrix(square: Any, values: FloatArray) -> FloatArray:
 
 @cache
 def _wave_numbers_and_weights(size: int) -> tuple[Any, Any, FloatArray, FloatArray]:
-    """Return wave numbers (x, y) in rad per pixel, their products, the smoothing weights, and how
-    often each wave counts.
-    """
+    """Return wave numbers (x, y; rad per pixel), products, smoothing weights, each wave's count."""
     x = 2.0 * np.pi * np.fft.rfftfreq(size)[np.newaxis]
     y = 2.0 * np.pi * np.fft.fftfreq(size)[:, np.newaxis]
     soft = np.exp(-0.5 * _SMOOTH**2 * (x * x + y * y)) * (x < np.pi) * (np.abs(y) < np.pi)

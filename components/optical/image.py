@@ -306,7 +306,9 @@ class ImageCamera(ElectroOptical):
     def _render_patch(
         self, scene: "_Scene", corner: IntArray, middle: FloatArray, attitude: Any, which: int
     ) -> FloatArray:
-        """Return a square patch of a frame, contrast with noise; `corner` is in binned pixels.
+        """Return a square patch of a frame, contrast with noise; `corner` is in binned pixels,
+        `middle` (of the target) in unbinned ones, `which` is `_CURRENT` or `_EARLIER` and keys the
+        noise.
 
         The optics blur before anything falls on pixels: it is drawn twice as fine, and summed up.
         """

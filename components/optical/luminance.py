@@ -144,9 +144,7 @@ def _relative_luminance(
 
 @lru_cache(maxsize=len(SKIES))
 def _relative_illuminance_by_sun(sky: str) -> FloatArray:
-    """Return the unscaled sky's illuminance of level ground for the sun at 0 to 90 deg, (91,). 90
-    deg, (91,). 90 degrees.
-    """
+    """Return the unscaled sky's illuminance of level ground for the sun at 0 to 90 deg, (91,)."""
     nodes, weights = np.polynomial.legendre.leggauss(48)
     elevation = 0.25 * np.pi * (nodes + 1.0)
     turn = 0.5 * np.pi * (nodes + 1.0)

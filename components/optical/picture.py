@@ -247,8 +247,7 @@ def _clipped_ramp_integral(u: FloatArray) -> FloatArray:
 def union_coverage(
     outlines: Sequence[FloatArray], rows: int, columns: int, smear: FloatArray
 ) -> FloatArray:
-    """Return the share of each pixel covered by the union of two convex outlines, averaged over the
-    exposure, (rows, columns).
+    """Return pixels' mean share in either of two convex outlines over exposure, (rows, columns).
 
     `smear` is how far they move meanwhile (x, y), pixels, half before and half after; the mean of
     so many exact pictures that the outline moves at most a quarter of a pixel between them, of 64
@@ -300,8 +299,7 @@ def textured_background(
     elevation_rad: FloatArray,
     grain_rad: float,
 ) -> FloatArray:
-    """Return random texture over a patch with mean 0 and standard deviation 1, fixed to directions
-    in north-east-down axes.
+    """Return patch texture, random, mean 0, standard deviation 1, fixed to north-east-down axes.
 
     Normal draws on a lattice of azimuth and elevation, smoothly interpolated (value noise) and
     scaled to the same variance everywhere. `normal` gives the draw of a lattice point by its two

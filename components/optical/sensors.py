@@ -59,9 +59,7 @@ def measured_areas(block: Component, wake: Wake, reference: Component) -> dict[s
 
 
 def silhouette_truth_errors(block: Component, wake: Wake, cells: IntArray) -> dict[str, FloatArray]:
-    """Return the rounding errors of the visible area in the given cells, against the same formula
-    in extended precision, m².
-    """
+    """Return cells' rounding errors of visible area, against extended precision, m²."""
     if np.finfo(np.longdouble).eps >= np.finfo(np.float64).eps:
         raise Unavailable("not measured: this machine has no extended precision")
     camera: Any = block

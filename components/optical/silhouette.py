@@ -29,8 +29,7 @@ def line_of_sight_in_target_axes(
     roll_rad: FloatArray,
     elevation_rad: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Return the line of sight as unit vector in the target's body axes (x nose, y right wing, z
-    down), and the sine of the angle off the nose.
+    """Return the unit line of sight in target axes (nose, right, down), and the sine off the nose.
 
     The line of sight runs from us to the target. Seen in a north-east-down frame turned so that
     its bearing is 0 it is (cos elevation, 0, -sin elevation); the target's yaw in that frame is
@@ -75,8 +74,7 @@ def line_of_sight_in_target_axes(
 def blend_front_and_back_area(
     cos_off_nose: FloatArray, front_m2: FloatArray, back_m2: FloatArray
 ) -> FloatArray:
-    """Return the average of front and back area, weighted by the cosine of the angle off the nose
-    (thesis eq. 20-21, errata 12).
+    """Return front and back area averaged by the cosine off the nose (thesis eq. 20-21, errata 12).
 
     (back - front)·(cos/2 + 1/2) + front: the back alone when the target flies away (cos = 1), the
     front alone when it comes head on (cos = -1). Written as a mean of the two so that it never
@@ -173,9 +171,7 @@ def _overlap_area(
     horizontal_m2: FloatArray,
     plate_aspect_ratio: float,
 ) -> FloatArray:
-    """Return the area that the projections of capsule and plate have in common, m²; slant = |u_x
-    u_y|, tilt = |u_z|.
-    """
+    """Return the common area of capsule and plate projections, m²; slant |u_x u_y|, tilt |u_z|."""
     # Where nothing can overlap, harmless stand-ins keep the arithmetic finite.
     overlaps = (
         (tilt > _SMALLEST_PLATE_TILT) & (round_m2 > _SMALLEST_ROUND_M2) & (horizontal_m2 > 0.0)

@@ -44,7 +44,9 @@ class Visibility(Effect[CellValues]):
     acts_on = CONTRAST
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether haze reduces contrast: needs visibility, fog or rain in ``[weather]``."""
+        """Return whether haze reduces contrast: needs visibility, fog or rain in ``[weather]``, and
+        a camera without an infrared band.
+        """
         weather = block.context.sections["weather"]
         if infrared_band_of(block) is not None:
             return Verdict(

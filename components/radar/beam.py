@@ -282,9 +282,7 @@ class Sweep:
     def _believed_pose_when_lit(
         self, detections: Detections, targets: LitTargets, row: IntArray, offset_s: FloatArray
     ) -> dict[str, FloatArray] | None:
-        """Return the believed pose at each detection's own instant by column, with the navigation
-        error of its scan; None without one.
-        """
+        """Return by column poses at detections with scans' navigation error; None without one."""
         believed = detections.pose_columns()
         if not believed or targets.revisit is None or not len(targets.roster):
             return None
@@ -345,9 +343,7 @@ class SweepingSensor(Sensor):
     def observed_targets_and_rows(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets at the instants of their illumination and the rows of the scans in
-        them; unchanged without a sweep.
-        """
+        """Return targets when illuminated, and the scans' rows in them; unchanged without sweep."""
         if self._sweep is None:
             return targets, rows
         return self._sweep.targets_when_lit(targets, rows, cued), np.arange(len(rows))

@@ -148,9 +148,7 @@ class MovingTargetFilter:
 
 @lru_cache(maxsize=64)
 def _weight_autocorrelation(kind: str, pulses: int) -> tuple[float, ...]:
-    """Return the one-sided autocorrelation of the filter's weights, normalised to the gain of noise
-    or of a pulse train.
-    """
+    """Return one-sided autocorrelation of weights over the gain of noise or of a pulse train."""
     if kind in _WEIGHTS:
         weights = np.array(_WEIGHTS[kind])
         over = float(np.sum(weights**2))

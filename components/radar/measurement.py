@@ -95,9 +95,7 @@ def signal_over_noise_and_clutter(snr: FloatArray, cnr: FloatArray | None) -> di
 
 
 def signal_variances(p: Any, snr: FloatArray) -> dict[str, FloatArray]:
-    """Return the variances of azimuth, elevation (rad²), range (m²) and range rate (m²/s²) at an
-    SNR per pulse.
-    """
+    """Variances of azimuth, elevation (rad²), range (m²), range rate (m²/s²) by SNR per pulse."""
     ratio = p.pulses_summed * snr
     variances = {
         angle: angle_variance(math.radians(width_deg), ratio, method=p.angle_measurement)

@@ -337,9 +337,7 @@ class RangeBoundary(Radar):
         ]
 
     def look(self, cells: Cells) -> Look:
-        """Return which cells are detected, with their margin: all in range whose echo no effect,
-        clutter or merging suppresses.
-        """
+        """Return which cells in range no effect, clutter or merging hides, with their margins."""
         # A metre is closer than any radar sees; it keeps the margin finite at range 0.
         ratio = self.reach.range_max_m / np.maximum(cells.range_m, 1.0)
         margin_db = 40.0 * np.log10(ratio)

@@ -219,8 +219,7 @@ _FARTHEST_M = math.sqrt(2.0 * SEMI_MAJOR_AXIS_M * 9000.0)
 def ambiguous_ranges_m(
     range_m: FloatArray, fold_m: float, farthest_m: float
 ) -> Iterator[FloatArray]:
-    """Yield, one multiple of the fold at a time, the other ranges up to `farthest_m` whose echoes
-    arrive together with those of `range_m`.
+    """Yield, per fold, other ranges up to `farthest_m` whose echoes arrive with those of `range_m`.
 
     Nearest first; infinite where there is none.
     """
@@ -285,9 +284,7 @@ class FoldedEcho(Echo):
     def _folded_rcs_and_source_range(
         self, cells: Cells, prf_hz: float
     ) -> tuple[FloatArray, FloatArray]:
-        """Return the folded clutter at one PRF as RCS at the target's range (m²), and the range
-        where most of it comes from (m).
-        """
+        """Return a PRF's folded clutter as RCS at the target (m²) and its main source range (m)."""
         total, most, where = np.zeros(len(cells)), np.zeros(len(cells)), np.array(cells.range_m)
         for other_m in ambiguous_ranges_m(cells.range_m, unambiguous_range_m(prf_hz), _FARTHEST_M):
             heard = np.isfinite(other_m) & (other_m >= self._nearest_m)

@@ -116,9 +116,7 @@ MEAN_RCS = Hook("mean RCS", CellValues, "each cell's mean RCS in m²")
 def _verdict_by_targets(
     context: Context, says: Callable[[Aircraft], str], *, otherwise: str
 ) -> Verdict:
-    """Return the verdict that an effect is needed if `says` returns a text for any known target, or
-    if none is known.
-    """
+    """Return the verdict: needed if `says` returns text for any known target, or none is known."""
     rosters = offered_rosters(context)
     if not rosters:
         return Verdict(True, "the targets are not known before the run")
@@ -172,9 +170,7 @@ class AspectRcs(Effect[CellValues]):
         )
 
     def build(self, block: Any) -> CellValues:
-        """Return a function that gives each cell's mean RCS: from a table over aspect if tables are
-        used, else a constant, m².
-        """
+        """Return a function giving cells' mean RCS, m²: a table over aspect, or else a constant."""
         return mean_rcs_m2 if block.p.aspect_rcs else constant_rcs_m2
 
 

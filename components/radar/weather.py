@@ -170,8 +170,7 @@ class Attenuation(Effect[CellValues]):
         )
 
     def bound(self, block: Any) -> dict[str, float]:
-        """Return the largest possible change of Pd by this effect within the radar's range, by
-        quantity; empty if no bound is known.
+        """Return, by quantity, the largest change of Pd within the radar's range; empty if unknown.
 
         The loss is at most its sea-level value times the range, and Pd falls by at most
         max |dPd / d ln SNR| per unit of ln SNR.
@@ -248,8 +247,7 @@ _RANGE_WITHOUT_ONE_M = 10e3
 
 
 def neglected_gas_loss_notes(block: Any) -> list[str]:
-    """Return in a list a note on clear-air loss that a radar above 10 GHz neglects, or an empty
-    list.
+    """Return a list: a note on clear-air loss if a radar above 10 GHz neglects it, else empty.
 
     It is not on by default: a radar calibrated by a range that was measured through air has the air
     in its calibration already, and scenes keep their values.
@@ -320,9 +318,7 @@ class CellsOfWeather(Effect[CellValues]):
         return weather_cells_verdict(block)
 
     def build(self, block: Any) -> CellValues:
-        """Return a function giving the factor on the SNR of each (scan, target) pair by loss in
-        weather cells.
-        """
+        """Return a function giving the SNR factor of each (scan, target) by weather-cell loss."""
         if not weather_cells(block) or block.wavelength_m is None:
             return lambda cells: np.ones(len(cells))
         weather, tables = block.context.sections["weather"], []

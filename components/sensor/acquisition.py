@@ -50,9 +50,7 @@ class AcquisitionRange(Parameters):
 
 
 def check_ranges_cover_all_speeds(ranges: tuple[AcquisitionRange, ...]) -> None:
-    """Raise ValueError unless the speed limits ascend and the last acquisition range has no limit,
-    so that it covers every faster target.
-    """
+    """Raise ValueError unless speed limits ascend and the last acquisition range has none."""
     speeds = [math.inf if one.below_m_s is None else one.below_m_s for one in ranges]
     if speeds and (speeds[-1] != math.inf or sorted(set(speeds)) != speeds):
         raise ValueError(

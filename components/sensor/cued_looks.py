@@ -48,9 +48,7 @@ class ConesAhead:
         self._old = NO_COUNTS
 
     def failure_counts(self) -> dict[str, IntArray]:
-        """Return the number of scans per run at which all cues received were older than their
-        validity, keyed by the message to show.
-        """
+        """Return, by message to show, on how many scans per run all cues received had expired."""
         return {"the cues that it has are older than their lasts_s": self._old}
 
     def __call__(self, targets: RelativeTargets, rows: IntArray, wake: Wake) -> BoolArray | None:
@@ -122,9 +120,7 @@ class ConesAhead:
     def is_in_cones(
         self, row: IntArray, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> BoolArray:
-        """Return a mask over directions (azimuth, elevation in body axes): True where the direction
-        lies in a cue cone that is valid at its row.
-        """
+        """Return which azimuths, elevations (body axes) lie in a cue cone valid at their row."""
         inside = np.zeros(len(row), dtype=bool)
         if self._cones is None:
             return inside
@@ -151,9 +147,7 @@ class CuedLooks(Effect[ConesAhead]):
     acts_on = CUE
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether cue cones are simulated, and why: only if another block sends cues to this
-        sensor.
-        """
+        """Return whether and why cue cones are simulated: if another block cues this sensor."""
         sources = _cueing_blocks(block)
         if not sources:
             return Verdict(False, "no wire brings cues")
@@ -183,9 +177,7 @@ def refuse_if_cued(block: Any, because: str = _NO_THRESHOLD) -> None:
 
 
 def cue_warnings(block: Any) -> list[str]:
-    """Return a warning if a cued sensor sets no cued_* key, or an uncued one sets one; else
-    nothing.
-    """
+    """Return a warning if a cued sensor sets no cued_* key or an uncued one sets one, else none."""
     given = [
         name
         for name in type(block.p).model_fields

@@ -21,17 +21,14 @@ from dsa_des.block.effect import Effect, Verdict
 
 
 def empty_look_memory(n: int, targets: int) -> BoolArray:
-    """Return the memory before any look: (targets, n - 1), all False as if the last looks had
-    missed.
-    """
+    """Return the memory before any look, (targets, n - 1): all False, as after missed looks."""
     return np.zeros((targets, n - 1), dtype=bool)
 
 
 def declare_looks(
     target: IntArray, detected: BoolArray, m: int, n: int, memory: BoolArray
 ) -> tuple[BoolArray, BoolArray]:
-    """Return a mask over looks, True where the target is declared by m of its last n looks, and the
-    memory (targets, n - 1) to pass to the next call.
+    """Return which looks declare their target by m of n, and the next memory (targets, n - 1).
 
     A target is declared at a look if m or more of its last n looks, this one included, detected
     it. Only looks count, each target's in order of time: a scan that did not look at a target
@@ -64,9 +61,7 @@ class DeclarationRule(Effect[Judging]):
     acts_on = DECLARATION
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether targets are declared by m of n detections, with the reason: needs
-        ``declare_m`` and ``declare_n``, and no declaration by position.
-        """
+        """Return whether m of n declares: ``declare_m`` and ``declare_n`` set, not by position."""
         m, n = block.p.declare_m, block.p.declare_n
         if m is None:
             return Verdict(False, "declare_m and declare_n are not given")
@@ -115,9 +110,7 @@ class Declarations:
         return replace(look, extras={**look.extras, "declared": declared})
 
     def _grow_memory(self, count: int) -> None:
-        """Enlarge the arrays per target to `count` targets; those added start undetected and
-        undeclared.
-        """
+        """Enlarge arrays per target to `count`; added targets start undetected and undeclared."""
         more = count - len(self._memory)
         self._memory = np.concatenate([self._memory, empty_look_memory(self.n, more)])
         self._first_tick = np.append(self._first_tick, np.full(more, -1))
@@ -149,8 +142,7 @@ _FEW_PAIRS, _SCANS_APART = 10_000, 10.0
 
 @dataclass(frozen=True)
 class SeenPlaces:
-    """Table of detections (run, scan, time, direction, range, variances) for declaration by
-    position, sorted by run and then by scan.
+    """Table of detections for declaration by position, sorted by run and then by scan.
 
     `time_s` is when each was measured, `direction` (n, 3) a unit vector in one frame; a range is
     NaN where none is measured, and a variance of NaN counts as 0.
@@ -180,8 +172,7 @@ class SeenPlaces:
 def count_scans_with_neighbour(
     places: SeenPlaces, asked: IntArray, n: int, *, speed_m_s: float, rate_rad_s: float
 ) -> IntArray:
-    """Return, for each entry of `asked`, in how many of the last n scans (its own counts as one)
-    there is a detection at the same position.
+    """Return for each of `asked` how many of the last n scans (own included) detect its place.
 
     Of the entries that are `asked` about, 1 to n each. Two detections have one position where
     direction and, if both have one, range differ by no more than a target may have moved between
@@ -207,9 +198,7 @@ def count_scans_with_neighbour(
 
 
 def _yield_pair_batches(first: IntArray, number: IntArray) -> Iterator[tuple[IntArray, IntArray]]:
-    """Yield, in batches that fit into memory, index arrays of all pairs: a position in `first`, and
-    each of the `number` entries that start at its `first`.
-    """
+    """Yield, in batches that fit into memory, i and each of `number[i]` entries from `first[i]`."""
     start, most = 0, max(1, _MOST_PAIRS // max(1, int(number.max(initial=1))))
     while start < len(first):
         part = slice(start, start + most)
@@ -316,9 +305,7 @@ class DeclaredPlaces:
         return replace(detections, extras={**detections.extras, "declared": declared})
 
     def _last_run_scan_by_place(self, detections: Detections, known: SeenPlaces) -> IntArray:
-        """Return, for each place in `known`, the number of the last scan of its run in these
-        detections, or its own scan if its run has none there.
-        """
+        """Return, for each place in `known`, its run's last scan in the detections, or its own."""
         ends = detections.instants.last_position_of_runs
         runs, last = detections.run[ends], detections.scan[ends]
         index = np.minimum(np.searchsorted(runs, known.run), len(runs) - 1)

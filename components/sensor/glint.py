@@ -76,9 +76,7 @@ class Wander:
         return azimuth, elevation, np.sqrt(x * x + y * y + z * z)
 
     def correlated_parts_by_quantity(self) -> dict[str, list[LastingPart]]:
-        """Return, by quantity (azimuth, elevation, range), the parts of glint that stay correlated
-        between looks.
-        """
+        """Return, by quantity (angles, range), the parts of glint correlated between looks."""
         share2, lasts_s = self._share**2, self._lasts_s
         return {
             "azimuth": [LastingPart(lasts_s=lasts_s, across_m2=share2 * self._level2)],
@@ -92,8 +90,7 @@ class Wander:
         signal: Mapping[str, FloatArray],
         pixel_rad: tuple[float, float] | None,
     ) -> dict[str, FloatArray]:
-        """Return the variances that glint adds to azimuth, elevation (rad²) and, where range is
-        measured, range (m²), by quantity, in the sensor's axes.
+        """Return, by quantity, glint's variances (rad²; m² if range is measured) in sensor axes.
 
         `pixel_rad` is the width and height of a pixel of a sensor that measures a target's size
         instead of its range.

@@ -69,9 +69,7 @@ class Grid:
             )
 
     def round(self, values: FloatArray) -> FloatArray:
-        """Return values rounded to the nearest multiple of the step within the grid's limits;
-        values must be finite, which is not checked.
-        """
+        """Return values (must be finite, unchecked) rounded to steps within the grid's limits."""
         if self.step == 0.0:
             result = values
         elif values.size <= _FEW and values.ndim == 1:
@@ -115,9 +113,7 @@ class Grid:
 
 
 def _mask_steps_and_remainders(size: Any, steps: Any) -> tuple[Any, Any, Any]:
-    """Return, for sizes >= 0, a mask of where rounding applies, the number of whole steps, and the
-    remainder.
-    """
+    """Return, for sizes >= 0, which are rounded (mask), the whole steps and the remainder."""
     counts = (steps > 0.0) & (size * _COUNTABLE < steps) & (size < _LARGEST)
     spacing = np.where(counts, steps, 1.0)
     size = np.where(counts, size, 0.0)
@@ -126,9 +122,7 @@ def _mask_steps_and_remainders(size: Any, steps: Any) -> tuple[Any, Any, Any]:
 
 
 def _round_to_grid(size: Any, steps: Any) -> Any:
-    """Return sizes >= 0 rounded to the nearest multiple of their step, ties to even; a size that
-    cannot be counted in steps stays as it is.
-    """
+    """Return sizes >= 0 rounded to the nearest step, ties to even; uncountable ones unchanged."""
     counts, whole, rest = _mask_steps_and_remainders(size, steps)
     return np.where(counts, (whole + _is_rounded_up(whole, rest, steps)) * steps, size)
 
@@ -150,9 +144,7 @@ def _round_countable(size: FloatArray, step: float) -> FloatArray:
 
 
 def _is_rounded_up(whole: Any, rest: Any, steps: Any) -> Any:
-    """Return a mask: True where the remainder exceeds half a step, or is exactly half a step after
-    an odd number of steps.
-    """
+    """Return where remainders exceed half a step, or are half after an odd step count (mask)."""
     # rest and steps - rest are compared without rounding: below half a step rest is subtracted
     # from the larger, above it the subtraction is exact (Sterbenz).
     other = steps - rest
@@ -164,9 +156,7 @@ def _is_rounded_up(whole: Any, rest: Any, steps: Any) -> Any:
 
 
 def _floor_to_grid(limit: Any, steps: Any) -> Any:
-    """Return the largest multiple of the step that exceeds the limit by no more than rounding
-    error.
-    """
+    """Return the largest multiple of the step up to the limit, allowing for rounding error."""
     size = np.abs(limit)
     counts, whole, rest = _mask_steps_and_remainders(size, steps)
     above = limit >= 0.0
@@ -232,9 +222,7 @@ class SensorGrid:
     def measure_false_alarms(
         self, where: Values, signal: Any = None, drawn: Any = None
     ) -> Measured:
-        """Return false alarms' azimuth, elevation and range rounded to the grid, and the variances
-        step²/12.
-        """
+        """Return false alarms' azimuth, elevation, range on the grid, and variances step²/12."""
         line = self.round(where["azimuth"], where["elevation"], where["range"])
         values = dict(zip(("azimuth", "elevation", "range"), line, strict=True))
         if "range_rate" in where:
@@ -247,9 +235,7 @@ class SensorGrid:
     def round(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray, range_m: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return azimuth, elevation (rad) and range (m; NaN if not measured), rounded and clipped
-        to the grid.
-        """
+        """Return azimuth, elevation (rad) and range (m or NaN), rounded and clipped to the grid."""
         azimuth = self._round_azimuth(azimuth_rad)
         elevation = self._elevation_grid.round(elevation_rad)
         if self._range_step is None:
@@ -268,9 +254,7 @@ class SensorGrid:
 
     @cached_property
     def _azimuth_sector(self) -> tuple[float, float]:
-        """Lower and upper azimuth of the field of view, rad; 2 pi is added to an upper one below
-        the lower.
-        """
+        """Lower and upper azimuth of view, rad; 2 pi is added to an upper one below the lower."""
         return unwrap_sector(*self._field)
 
     @cached_property

@@ -31,9 +31,7 @@ def absolute_angle_difference_mrad(one: AnyArray, other: AnyArray) -> FloatArray
 
 
 def spread_over_roster(targets: RelativeTargets, values: FloatArray) -> FloatArray:
-    """Return values of the moved targets as an array (rows, all targets of the roster, ...), NaN
-    for a target that is absent or left out.
-    """
+    """Return the moved targets' values (rows, roster targets, ...), NaN if absent or left out."""
     shape = (len(values), len(targets.roster), *values.shape[2:])
     wide: FloatArray = np.full(shape, np.nan)
     wide[:, targets.columns] = values
@@ -50,8 +48,7 @@ def over_cells(
     *,
     out_of_range: float = np.nan,
 ) -> dict[str, FloatArray]:
-    """Evaluate a function of a sensor's cells and return its columns by name, each spread to shape
-    (scans, targets of the roster).
+    """Evaluate a function of a sensor's cells; return its columns by name, (scans, roster targets).
 
     `out_of_range` where the target was not looked at because it is too far away, NaN where it was
     not for any other reason.
@@ -77,9 +74,7 @@ def over_cells(
 def make_cell_measure(
     values: Callable[[Any, Cells], dict[str, FloatArray]], *, out_of_range: float = np.nan
 ) -> Measure:
-    """Return a function `measure(block, wake, reference)` for a ladder of models, which evaluates
-    `values(sensor, cells)` at every scan and target.
-    """
+    """Return `measure(block, wake, reference)`: `values(sensor, cells)` at all scans, targets."""
 
     def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
         sensor: Any = block

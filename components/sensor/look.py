@@ -168,8 +168,7 @@ class Cells:
     def relative_target_fields_ahead(
         self, cells: IntArray, ahead_s: FloatArray
     ) -> Mapping[str, AnyArray]:
-        """Return the fields of `RelativeTargets` for chosen cells at instants `ahead_s` seconds
-        later than the cell's own, one offset per cell.
+        """Return chosen cells' `RelativeTargets` fields, each `ahead_s` s after its own instant.
 
         The ownship's pose is ``own_lat_deg`` and so on, the target's position ``target_lat_deg``
         and so on; ``present`` says whether both aircraft are there then. ValueError if the targets
@@ -195,9 +194,7 @@ class Cells:
         return getattr(self._targets, name).take(self._flat // self._width)
 
     def believed_pose_component(self, name: str) -> FloatArray:
-        """Return, for each cell, one field by name of the position and attitude that the ownship
-        believes.
-        """
+        """Return per cell one field, by name, of the ownship's believed position and attitude."""
         believed = self._targets.believed
         if believed is None:
             raise ValueError("a block on the way does not say what the ownship believes of itself")
@@ -230,15 +227,11 @@ class Cells:
 
     @cached_property
     def equipage_rows(self) -> IntArray:
-        """Return the row of the roster's equipage table that holds for each cell's target at
-        `state_ns`.
-        """
+        """Return the roster's equipage row that holds for each cell's target at `state_ns`."""
         return self.roster.equipage_rows(self.craft, self.state_ns)
 
     def draws(self, stream: Any, draw: int = 0) -> FloatArray:
-        """Return a number in [0, 1) per cell, the same whenever stream, run, target, scan and
-        `draw` are.
-        """
+        """Return a number in [0, 1) per cell, fixed by stream, run, target, scan and `draw`."""
         keys = self.roster.draw_keys_of(self.target)
         return stream.of_runs(self.run, self.instant_ns).uniform(keys, self.scan, draw)
 

@@ -128,8 +128,7 @@ class ErrorModel:
         run: IntArray,
         instant_ns: IntArray,
     ) -> Values:
-        """Return true values, where detections by noise are moved at random within their target's
-        resolution cell.
+        """Return true values, noise detections moved at random in their target's resolution cell.
 
         It errs from there, and states of itself, what any report as strong does: noise does not
         say that it is noise.
@@ -152,9 +151,7 @@ class ErrorModel:
 
     @cached_property
     def _noise_limits(self) -> dict[str, tuple[float, float]]:
-        """Lower and upper limit, by quantity, within which a detection caused by noise can lie; no
-        entry for an azimuth that wraps round.
-        """
+        """Lower, upper limit by quantity of detections by noise; none if azimuth wraps round."""
         reach = self._block.reach
         fields = {"elevation": reach.elevation_rad}
         if self._block.measures_range:
@@ -165,8 +162,7 @@ class ErrorModel:
         return fields
 
     def measure_false_alarms(self, where: Values, signal: Values, drawn: Any) -> Measured:
-        """Return reported values (with errors, on the grid) and variances of false alarms that lie
-        at `where`, as for real targets.
+        """Return values (with errors, on the grid) and variances of the false alarms at `where`.
 
         `drawn` holds keys, scan, instant and run by which errors are drawn, or is None.
         """
@@ -201,8 +197,7 @@ class ErrorModel:
         return values, columns
 
     def _round_and_normalise(self, values: Values) -> dict[str, FloatArray]:
-        """Return values with errors as they are reported: azimuth and elevation wrapped into their
-        intervals, range positive, all on the grid.
+        """Return values with errors as reported: angles wrapped, range positive, all on the grid.
 
         An elevation beyond the vertical is one on its other side; a range is above 0.
         """

@@ -86,9 +86,7 @@ class Measuring(Component):
         elevation_rad: FloatArray,
         range_m: FloatArray,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return measured azimuths, elevations and ranges in body axes, and a dictionary with
-        variances and range rates, of true lines of sight.
-        """
+        """Return azimuths, elevations, ranges in body axes and a dict of variances, range rates."""
         if self.wander is not None:
             line = azimuth_rad, elevation_rad, range_m
             azimuth_rad, elevation_rad, range_m = self.wander(cells, detected, *line)
@@ -104,8 +102,7 @@ class Measuring(Component):
         signal: Mapping[str, FloatArray],
         drawn: Any = None,
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return the reported azimuths, elevations and ranges in body axes, and the variance
-        columns, of false alarms that lie at `where`.
+        """Return false alarms' azimuths, elevations, ranges (body axes) and variances at `where`.
 
         `where` is its position by quantity in the sensor's axes, `signal` as in `Look.signal`.
         `drawn` holds keys, scan, instant and run by which errors are drawn, as a target's are:
@@ -119,9 +116,7 @@ class Measuring(Component):
     def _to_body_axes(
         self, values: Mapping[str, FloatArray], variances: Mapping[str, FloatArray]
     ) -> tuple[FloatArray, FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Return azimuths and elevations turned from the sensor's axes to body axes, ranges, and
-        the columns of variances and range rates.
-        """
+        """Return azimuths, elevations (body axes), ranges, and variance and range-rate columns."""
         angles = values["azimuth"], values["elevation"]
         of_angles = self.axes.variances_in_body(*angles, variances[AZIMUTH], variances[ELEVATION])
         beside = {**variances, AZIMUTH: of_angles[0], ELEVATION: of_angles[1]}

@@ -32,9 +32,7 @@ class SensorAxes:
     believed_rad: Angles3 | None = None
 
     def reach_in_body_axes(self, reach: Reach) -> Reach:
-        """Return the sensor's reach as one that accepts lines of sight in body axes and turns them
-        by the true mounting angles.
-        """
+        """Return the reach for lines of sight in body axes, turned by true mounting angles."""
         if self.true_rad is None:
             return reach
         return MountedReach(
@@ -52,17 +50,13 @@ class SensorAxes:
     def believed_direction_in_body(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> Angles:
-        """Return azimuth and elevation in body axes (rad) of directions in the sensor's axes, by
-        the mounting angles that the ownship believes.
-        """
+        """Return azimuth, elevation in body axes (rad) from sensor axes, by believed mounting."""
         return _to_body(azimuth_rad, elevation_rad, self.believed_rad)
 
     def believed_direction_in_sensor(
         self, azimuth_rad: FloatArray, elevation_rad: FloatArray
     ) -> Angles:
-        """Return azimuth and elevation in the sensor's axes (rad) of directions in body axes, by
-        the mounting angles that the ownship believes.
-        """
+        """Return azimuth, elevation in sensor axes (rad) from body axes, by believed mounting."""
         return _from_body(azimuth_rad, elevation_rad, self.believed_rad)
 
     def variances_in_body(
@@ -72,9 +66,7 @@ class SensorAxes:
         azimuth_variance_rad2: FloatArray,
         elevation_variance_rad2: FloatArray,
     ) -> Angles:
-        """Return azimuth and elevation variances (rad²) in body axes, converted from the sensor's
-        axes.
-        """
+        """Return azimuth and elevation variances (rad²) in body axes from those in sensor axes."""
         if self.believed_rad is None:
             return azimuth_variance_rad2, elevation_variance_rad2
         return rotate_variances(
@@ -111,9 +103,7 @@ class MountedReach(Reach):
 
     @property
     def steepest_elevation_rad(self) -> float:
-        """Upper bound, rad, of the absolute elevation in body axes that the tilted field of view
-        reaches.
-        """
+        """Upper bound, rad, of absolute elevation in body axes of the tilted field of view."""
         _, elevation, roll = self.axes.true_rad or (0.0, 0.0, 0.0)
         tilt = math.acos(max(-1.0, min(1.0, math.cos(elevation) * math.cos(roll))))
         return min(0.5 * math.pi, super().steepest_elevation_rad + tilt)
@@ -126,9 +116,7 @@ class MountedReach(Reach):
         present: BoolArray,
         hidden: BoolArray | None = None,
     ) -> ReasonArray:
-        """Return a code per target: evaluated, or why it is skipped; the given angles are in body
-        axes.
-        """
+        """Return a code per target: evaluated, or why skipped; the angles are in body axes."""
         angles = self.axes(body_azimuth_rad, body_elevation_rad)
         return super().skip_reasons(*angles, range_m, present, hidden)
 
@@ -144,9 +132,7 @@ class Mounting(Effect[SensorAxes]):
     outside_the_proof = "rotating by an angle of 0 and back rounds the last bits"
 
     def verdict(self, block: Any) -> Verdict:
-        """Return whether mounting is simulated, with the reason: needs a non-zero ``mount_*_deg``
-        or ``misalignment_deg``.
-        """
+        """Return whether mounting is simulated: ``mount_*_deg`` or ``misalignment_deg`` not 0."""
         p = block.p
         turned = [f"{key} is {getattr(p, key):g}" for key in _MOUNT_KEYS if getattr(p, key)]
         if any(p.misalignment_deg):

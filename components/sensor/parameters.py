@@ -35,9 +35,7 @@ class StatedError:
 
     @property
     def mean_square_of_bias(self) -> float:
-        """Mean square of the bias: a third of its square if it is drawn for each run, else its
-        square.
-        """
+        """Mean square of the bias: its square, or a third of that if drawn for each run."""
         return self.bias**2 / (3.0 if self.drawn_bias else 1.0)
 
     @property
@@ -47,9 +45,7 @@ class StatedError:
 
     @property
     def variance(self) -> float:
-        """Variance of rounding plus mean square error; rounding's alone if the error is a share of
-        the value.
-        """
+        """Rounding variance, plus mean square error unless the error is a share of the value."""
         return rounding_variance_of_step(self.step) + (
             0.0 if self.share else self.mean_square_without_rounding
         )
@@ -132,8 +128,7 @@ class ErrorParameters(ClockedParameters):
         return f"{name}_error_{unit}", f"{name}_bias_{unit}", f"{name}_correlation_time_s"
 
     def stated_errors(self, steps: Mapping[str, float]) -> dict[str, StatedError]:
-        """Return, by quantity, the error that the scene states (grid step, deviation, bias,
-        correlation time), in rad, m and m/s.
+        """Return stated errors by quantity (step, deviation, bias, correlation time; rad, m, m/s).
 
         Nothing of a quantity for which a user's sensor has no such parameters.
         """
@@ -200,9 +195,7 @@ class GlintParameters(ErrorParameters):
 
 
 def check_field_of_view_azimuths(value: tuple[float, float]) -> tuple[float, float]:
-    """Return the pair of azimuths (deg, clockwise from first to second) unchanged; ValueError if it
-    is no valid field of view.
-    """
+    """Return the pair of azimuths (deg, clockwise) unchanged; ValueError if not a field of view."""
     if not all(-360 <= angle <= 360 for angle in value):
         raise ValueError("must hold two angles in [-360, 360], clockwise from the first")
     if value[0] == value[1] or not -360 < value[1] - value[0] <= 360:

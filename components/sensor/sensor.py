@@ -163,8 +163,7 @@ class Sensor(Measuring):
         return replace(self._reach_in_body_axes, range_slack=slack, exact_because=because)
 
     def relative_range_tolerance(self) -> float:
-        """Return the largest relative range error that keeps results within ``[accuracy]``;
-        infinity: any.
+        """Return the largest relative range error that ``[accuracy]`` allows; infinity: any.
 
         Infinite where nothing that ``[accuracy]`` bounds depends on the range.
         """
@@ -221,9 +220,7 @@ class Sensor(Measuring):
         return bool(record is not None and record.looks)
 
     def records(self) -> list[type[Message]]:
-        """Return the types of message to record: detections, and all looks if the scene asks for
-        them.
-        """
+        """Return the message types to record: detections, and all looks if the scene asks."""
         return [self._message, EveryLook] if self._is_every_look_recorded else [self._message]
 
     @cached_property
@@ -245,8 +242,7 @@ class Sensor(Measuring):
     def observed_targets_and_rows(
         self, targets: RelativeTargets, rows: IntArray, cued: BoolArray | None = None
     ) -> tuple[RelativeTargets, IntArray]:
-        """Return the targets as this sensor observes them (here unchanged; a sweeping beam at its
-        own instants), and the row of each scan in them.
+        """Return targets as observed (unchanged; a sweep at its own instants), and each scan's row.
 
         `cued` (scans, targets) says which lie in a cue cone.
         """
@@ -343,9 +339,7 @@ class Sensor(Measuring):
     def cells(
         self, targets: RelativeTargets, rows: IntArray, wake: Wake
     ) -> tuple[Cells, ReasonArray]:
-        """Return the (scan, target) pairs to evaluate, and a code for all: evaluated, or why
-        skipped.
-        """
+        """Return the (scan, target) pairs to evaluate; codes for all: evaluated or why skipped."""
         reason = self._reasons_of_scans(targets, rows)
         wanted = reason == EVALUATE
         cells = Cells(targets, rows, wanted, wake.scans, wake.ticks, wake.ticks_per_s, wake.run)
@@ -356,9 +350,7 @@ class Sensor(Measuring):
         return {} if self._cue_cones is None else self._cue_cones.failure_counts()
 
     def report(self) -> dict[str, Any]:
-        """Return each target's first declaration (time and true range), or None; empty without such
-        a rule.
-        """
+        """Return each target's first declaration (time, true range) or None; empty if no rule."""
         rule = (
             "declaration"
             if self.p.declares_by_target_or_place == "target"
@@ -377,9 +369,7 @@ class Sensor(Measuring):
         return {"declarations": {self.name: first}}
 
     def _reasons_of_scans(self, targets: RelativeTargets, rows: IntArray) -> ReasonArray:
-        """Return a reason code (scans, targets): evaluate, or why it is skipped; taken from an
-        upstream gate if there is one, else by the sensor's reach.
-        """
+        """Return reason codes (scans, targets) from an upstream gate if any, else by the reach."""
         if isinstance(targets, GatedTargets) and self.name in targets.decisions:
             reason = targets.decisions[self.name].reasons_at(rows)
             if reason is not None:

@@ -67,9 +67,7 @@ def _min_cell_distances_m(block: Any) -> list[float] | None:
 
 
 def weather_cells_on_sight_lines(block: Any, cells: Cells) -> Iterator[tuple[WeatherCell, Within]]:
-    """Yield each weather cell and where each line of sight enters and leaves it, as shares of its
-    length.
-    """
+    """Yield each weather cell and where lines of sight enter and leave it, as length shares."""
     place = [cells.field_at_rows(f"own_{name}") for name in ("lat_deg", "lon_deg", "alt_m")]
     line = cells.azimuth_rad, cells.elevation_rad, cells.range_m
     time_s = cells.state_ns / NANOSECONDS

@@ -34,9 +34,7 @@ class Repeatable:
 
     @contextmanager
     def isolated_random_state(self) -> Iterator[None]:
-        """Context in which Stone Soup draws from this object's own random state; the global
-        generators and its hash are restored afterwards.
-        """
+        """Let Stone Soup draw from this object's state, and restore global generators and hash."""
         from stonesoup.base import Base
 
         numbers = self._numbers

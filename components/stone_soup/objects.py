@@ -35,9 +35,7 @@ def to_datetime(time_s: float) -> datetime:
 
 
 def state_vectors(position_ned_m: FloatArray, velocity_ned_m_s: FloatArray) -> list[StateVector]:
-    """Return Stone Soup state vectors (east, north, up and their velocities) from positions and
-    velocities (3, n) along north, east, down.
-    """
+    """Return Stone Soup state vectors (east, north, up, velocities) from (3, n) in NED axes."""
     result = np.empty((6, position_ned_m.shape[1]))
     for part, ned in ((POSITION, position_ned_m), (VELOCITY, velocity_ned_m_s)):
         result[list(part)] = ned[1], ned[0], -ned[2]

@@ -43,9 +43,7 @@ class Follower:
     def update_tracks(
         self, tracks: Any, time_s: float, when: datetime, mask_of: Mapping[str, int]
     ) -> list[Followed]:
-        """Update what is kept of each track after a look, and return all tracks by number; those
-        that ended are returned once more as deleted.
-        """
+        """Update tracks' memory after a look; return all by number, ended ones once as deleted."""
         from components.stone_soup.objects import START
 
         def seconds(instant: datetime) -> float:

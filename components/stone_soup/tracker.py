@@ -31,9 +31,7 @@ from dsa_des.time.randomness import key_of
 
 
 def _absolute_builder_path(value: Any) -> Any:
-    """Return the name of the builder function with its file as an absolute path; a bare ``file.py``
-    is taken from the scene's folder.
-    """
+    """Return the builder's name with absolute path; a bare ``file.py`` is in the scene's folder."""
     if not isinstance(value, str):
         return value
     file = value.rpartition(":")[0]

@@ -185,9 +185,7 @@ class Active(CooperativeSensor):
         self._errs = parameters.measurement != "exact"
 
     def offer(self, port: str) -> Any:
-        """Return what this sensor offers: variances that differ by reply, range and elevation
-        errors that last, and how often replies come.
-        """
+        """Return the offer: variances by reply, lasting range and elevation errors, reply rates."""
         offer: SensorOffer = super().offer(port)
         period_s, every = float(1 / self.p.scan_rate_hz), self.p.far_every
         # The delay of a transponder and the error of an altimeter stay; of a range what is stated
@@ -218,9 +216,7 @@ class Active(CooperativeSensor):
         self, cells: Cells, which: AnyArray, range_m: FloatArray, azimuth_rad: FloatArray,
         instant_ns: IntArray,
     ) -> FloatArray:  # fmt: skip
-        """Return the probability of an answer for chosen cells, at the given ranges, bearings and
-        instants; 0 out of reach or without a transponder.
-        """
+        """Return chosen cells' answer probabilities; 0 out of reach or without a transponder."""
         equipage = cells.roster.equipage
         craft = cells.roster.equipage_rows(cells.craft[which], instant_ns)
         mode_s, mode_c = equipage.mode_s[craft], equipage.mode_c[craft]
@@ -255,8 +251,7 @@ class Active(CooperativeSensor):
         return Look(detected, probability, extras)
 
     def _is_interrogated(self, cells: Cells, which: AnyArray) -> BoolArray:
-        """Return a mask over chosen cells: True where the aircraft is interrogated at this scan,
-        because it is near, new, or its turn has come.
+        """Return which aircraft are interrogated at this scan: near, new, or in their turn (mask).
 
         Near ones are known by the ranges measured at an aircraft's own last two turns, new ones by
         that it did not answer at one of them: it was not there, out of reach, or not heard.
@@ -283,9 +278,7 @@ class Active(CooperativeSensor):
     def _has_answered_at(
         self, cells: Cells, which: AnyArray, then: Any, instant_ns: IntArray
     ) -> BoolArray:
-        """Return a mask over chosen cells: True where the aircraft, at positions `then`, answered
-        at that instant.
-        """
+        """Return which cells' aircraft, at positions `then`, answered at that instant (mask)."""
         azimuth, elevation = then["body_azimuth_rad"], then["body_elevation_rad"]
         there = then["present"] & (instant_ns >= 0)
         hidden = then.get("hidden")
@@ -304,9 +297,7 @@ class Active(CooperativeSensor):
     def _has_recent_answer(
         self, cells: Cells, which: AnyArray, in_1_s: FloatArray, instant_ns: IntArray
     ) -> BoolArray:
-        """Return a mask over chosen cells: True where at least one of the last ten rounds (0.1 s
-        each) got an answer, drawn at random.
-        """
+        """Return where any of the last ten rounds (0.1 s each) got an answer, by draw (mask)."""
         last = instant_ns // round(ROUND_S * NANOSECONDS)
         rounds = last[:, np.newaxis] + ROUNDS - np.arange(ROUNDS)
         run = np.repeat(cells.run[which], ROUNDS)
@@ -396,9 +387,7 @@ class Active(CooperativeSensor):
     def _error_deviations(
         self, cells: Cells, detected: AnyArray, altitude_m: FloatArray, deviation: FloatArray
     ) -> dict[str, FloatArray]:
-        """Return the standard deviations of all errors of each reply, and the ownship's velocity,
-        by the column names in `TOLD`.
-        """
+        """Return standard deviations of replies' errors, and ownship velocity, by `TOLD` name."""
         none = np.zeros(len(detected))
         mode_s = cells.roster.equipage.mode_s[cells.equipage_rows[detected]]
         position_m, attitude_rad = position_and_attitude_deviations(self.context)

@@ -133,9 +133,7 @@ class AdsBParameters(CooperativeParameters):
 
 
 def _reported_position_errors_m(receiver: Any, cells: Cells) -> dict[str, FloatArray]:
-    """Return how far reported positions lie north and east of the aircraft's true positions at each
-    look, m, if every message is received.
-    """
+    """Return reported positions' errors north, east at each look, m, if all messages arrive."""
     receiver.law = LAWS["certain"][0]
     look = receiver.look(cells)
     here = cells.relative_target_fields_ahead(np.arange(len(cells)), np.zeros(len(cells)))
@@ -249,16 +247,12 @@ class AdsB(CooperativeSensor):
         return {**super().grid_step_by_quantity, "range_rate": 0.0}
 
     def cells(self, targets: Any, rows: IntArray, wake: Wake) -> tuple[Cells, Any]:
-        """Return cells and reasons as every sensor does, and remember the instant of the scan
-        before each, from which on messages count.
-        """
+        """Return cells and reasons; remember each previous scan, from which on messages count."""
         self._before_ns = ticks_to_nanoseconds(wake.previous_scan_tick, wake.ticks_per_s)
         return super().cells(targets, rows, wake)
 
     def look(self, cells: Cells) -> Look:
-        """Receive the messages sent since the last scan, decode the newest of each aircraft, and
-        return the look with the report columns.
-        """
+        """Return a look at each aircraft's newest message since the last scan, with its report."""
         extras = empty_report_columns(len(cells))
         moves = np.full((3, len(cells)), np.nan)
         sends = np.flatnonzero(cells.roster.ever_broadcasts[cells.craft])
@@ -280,9 +274,7 @@ class AdsB(CooperativeSensor):
     def _received_cells_numbers_sent_ns(
         self, kind: str, cells: Cells, asked: IntArray
     ) -> tuple[IntArray, IntArray, IntArray]:
-        """Return indices of cells with a received message, and its number and sending instant (ns),
-        the newest.
-        """
+        """Return indices of cells with a message, the newest's number and sending instant (ns)."""
         none = np.zeros(0, dtype=np.int64)
         if not len(asked):
             return none, none, none

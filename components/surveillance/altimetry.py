@@ -39,9 +39,7 @@ def altimetry_error_ft(
 
 
 def altimetry_variance_ft2(altitude_ft: FloatArray) -> FloatArray:
-    """Return the altimetry error variance, ft², at altitudes, averaged over better and other
-    altimeters.
-    """
+    """Return altimetry variance, ft², at altitudes, averaged over better and other altimeters."""
     layer = np.searchsorted(LAYER_TOPS_FT, altitude_ft, side="left")
     share = SHARE_OF_BETTER[layer]
     return np.asarray(2.0 * (share * BETTER_FT[layer] ** 2 + (1.0 - share) * OTHER_FT[layer] ** 2))

@@ -47,9 +47,7 @@ class Transponders:
     def from_cells(
         cls, cells: Cells, which: IntArray, instant_ns: IntArray | None = None
     ) -> Transponders:
-        """Return the transponders of chosen cells' targets, with the equipage they have at
-        `instant_ns` or, by default, at the look.
-        """
+        """Return the targets' transponders, equipped as at `instant_ns`, by default at the look."""
         keys = cells.roster.draw_keys_of(cells.target[which])
         craft = cells.equipage_rows[which]
         if instant_ns is not None:
@@ -70,8 +68,7 @@ class Altimeters:
         step_ft: npt.ArrayLike,
         errs: bool = True,
     ) -> FloatArray:
-        """Return the altitudes in ft that transponders report, with the altimeter's error and
-        rounded to `step_ft`; a step of 0 rounds nothing.
+        """Return reported altitudes, ft, with altimeter error, rounded to `step_ft` (not if 0).
 
         NaN where no code has them.
         """
@@ -251,8 +248,7 @@ class Broadcasts:
 def velocity_in_axes_of_later_position(
     position: list[FloatArray], north_east_down: FloatArray, later_s: FloatArray
 ) -> FloatArray:
-    """Return velocities (3, n) along the north and east of the given positions, of velocities
-    measured `later_s` earlier along the path.
+    """Return velocities (3, n) of `later_s` earlier, turned to north and east of these positions.
 
     North turns with the meridians, within a mile of a pole by degrees from message to message.
     """

@@ -44,8 +44,7 @@ def number_of_longitude_zones(lat_deg: npt.ArrayLike) -> IntArray:
 def encode(
     lat_deg: npt.ArrayLike, lon_deg: npt.ArrayLike, odd: npt.ArrayLike
 ) -> tuple[IntArray, IntArray]:
-    """Return the CPR-encoded latitude and longitude, integers from 0 to 131071, of positions in
-    degrees; `odd` selects the odd format.
+    """Return positions (deg) as CPR latitude, longitude, integers 0 to 131071; odd format if `odd`.
 
     `odd` says which format each report has. ValueError if a latitude lies beyond a pole or a number
     is not finite.
@@ -120,9 +119,7 @@ def _angle_nearest_to(share: FloatArray, near: FloatArray, width: FloatArray) ->
 
 
 def _zone_and_share(angle_deg: FloatArray, width_deg: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the number of the zone of `width_deg` that each angle lies in, and the fraction of the
-    zone from its lower edge to the angle.
-    """
+    """Return each angle's zone of `width_deg` by number, and its fraction from the lower edge."""
     zones = angle_deg / width_deg
     number = np.floor(zones)
     return number, zones - number

@@ -120,9 +120,7 @@ class CooperativeSensor(Sensor):
     def heights_from_altitudes_m(
         self, cells: Cells, which: AnyArray, altitude_m: FloatArray
     ) -> FloatArray:
-        """Return the heights (m) that the receiver assigns to reported pressure altitudes: as
-        reported, or relative to the ownship's own altimeter.
-        """
+        """Return heights (m) of pressure altitudes: as reported or relative to the ownship's."""
         if self.p.heights == "reported":
             return altitude_m
         own_m = self.pressure_altitude_m(cells.field_at_rows("own_alt_m")[which])
@@ -147,9 +145,7 @@ class CooperativeSensor(Sensor):
         ]
 
     def warnings(self) -> list[str]:
-        """Return a warning if no target has equipment that this sensor receives, and a note on how
-        pressure altitudes are used as heights.
-        """
+        """Return a warning if no target is equipped, and a note on pressure altitude as height."""
         rosters = offered_rosters(self.context)
         heard = [getattr(one.equipage, name).any() for one in rosters for name in self.hears_of]
         said = [*super().warnings(), *self._pressure_height_notes()]
@@ -177,9 +173,7 @@ class CooperativeSensor(Sensor):
     def is_heard_and_not_excluded(
         self, cells: Cells, heard: BoolArray, address: IntArray
     ) -> BoolArray:
-        """Return a mask over cells: True where a message was received and the address is not one of
-        the aircraft to leave out.
-        """
+        """Return which cells have a received message and no address to leave out (mask)."""
         roster = cells.roster
         for name in self.p.leaves_out:
             craft = np.full(len(cells), roster.names.index(name))
@@ -192,8 +186,7 @@ class CooperativeSensor(Sensor):
     def has_position_counting_others(
         self, cells: Cells, heard: IntArray, altitude_m: FloatArray
     ) -> BoolArray:
-        """Return a mask over received cells: True where the altitude is known; others are added to
-        a count.
+        """Return which received cells have a known altitude (mask); the others add to a count.
 
         An altitude that no code has is not available (NaN).
         """
@@ -218,9 +211,7 @@ def own_velocity(cells: Cells, which: IntArray) -> FloatArray:
 def velocity_ned_from_positions(
     cells: Cells, which: IntArray, ahead_s: FloatArray, here: Any, whose: str
 ) -> FloatArray:
-    """Return the velocity along north, east and down, (3, n), m/s, of the ownship or the targets,
-    from their positions 1/64 s before and after.
-    """
+    """Return north, east, down velocity (3, n), m/s, from positions 1/64 s before and after."""
     positions = [here[f"{whose}_{name}"] for name in POSITION_FIELDS]
     moved, span_s = [], np.zeros(len(which))
     for step_s in (-STEP_S, STEP_S):

@@ -135,8 +135,7 @@ class PositionExchange(Component):
         )
 
     def _velocities_and_fix_errors(self, wake: Wake, states: TrafficStates) -> list[FloatArray]:
-        """Return true velocities (3, rows, aircraft; ownship first) and the errors of position and
-        of velocity of every aircraft.
+        """Return true velocities (3, rows, aircraft; ownship first), position and velocity errors.
 
         The ownship is the first whoever looks.
         """

@@ -35,9 +35,7 @@ def transponder_reach_m(bearing_rad: FloatArray, mode_s: BoolArray) -> FloatArra
 
 
 def answer_probability_per_round(in_1_s: FloatArray) -> FloatArray:
-    """Return the probability of an answer in one round, from that of any answer in a second's ten
-    rounds.
-    """
+    """Return the probability of an answer in a round, from that of any in a second's ten."""
     return np.asarray(1.0 - (1.0 - in_1_s) ** (1.0 / ROUNDS))
 
 

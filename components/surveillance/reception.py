@@ -73,9 +73,7 @@ def time_to_receive_95_percent_s(probability: FloatArray) -> FloatArray:
 def reception_time_steps(
     law: Callable[[FloatArray], FloatArray], reach_m: float
 ) -> list[tuple[float, float]]:
-    """Return steps (range in m, time in s): up to this range, the next position of an aircraft is
-    received within this time in 19 of 20 cases.
-    """
+    """Return steps (m, s): up to this range, 19 of 20 next positions arrive within this time."""
     ranges_m = np.array([np.inf])
     if np.isfinite(reach_m):
         ranges_m = np.linspace(0.0, reach_m, _PROMISED_RANGES + 1)[1:]

@@ -78,9 +78,7 @@ ERRORS_OF_REPLIES = (
 
 
 def told_errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[ToldError, ...]:
-    """Return the kinds of error that broadcasts state of themselves, with how long each stays
-    correlated.
-    """
+    """Return the kinds of error that broadcasts state, and how long each stays correlated."""
     lasts_s = 0.0 if position_errors == "white" else CORRELATION_TIME_S
     ways = {"place_deviation": (NORTH, EAST), "speed_deviation": (SPEED_NORTH, SPEED_EAST)}
     level = [ToldError(way, told, lasts_s) for told, both in ways.items() for way in both]
@@ -89,9 +87,7 @@ def told_errors_of_broadcast(position_errors: str, is_geometric: bool) -> tuple[
 
 
 def empty_error_columns(count: int) -> dict[str, FloatArray]:
-    """Return the `TOLD` columns for `count` reports without velocity and without stated errors: 0
-    for deviations and ages, NaN for others.
-    """
+    """Return empty `TOLD` columns for `count` reports: 0 for deviations, ages; NaN for others."""
     none, unknown = np.zeros(count), np.full(count, np.nan)
     return {name: none if name.endswith(("deviation", "age_s")) else unknown for name in TOLD}
 
@@ -104,8 +100,7 @@ def position_variances_of_replies_m2(
     step_ft: FloatArray,
     mode_s: BoolArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return the variances (m²) of positions from transponder replies: horizontally across and
-    along the line of sight, and vertical.
+    """Return replies' position variances, m²: across and along the line of sight, and vertical.
 
     Bearing and range are counted from the ownship's own place, which has `place_m2`; the altitude
     is that of no pose.
@@ -157,15 +152,12 @@ class StatedByAircraft:
 
     @property
     def position_lag_s(self) -> FloatArray:
-        """Time, s, by which reported positions lag as latency is not compensated; 0 without
-        velocity.
-        """
+        """Time, s, that reported positions lag by uncompensated latency; 0 without velocity."""
         known = ~np.isnan(self.said["reported_north_m_s"])
         return np.where(known, self.equipage.uncompensated_latency_s[self.craft], 0.0)
 
     def extrapolation_time_s(self, age_s: FloatArray) -> FloatArray:
-        """Return the total time over which each position is extrapolated: its age, and what the
-        aircraft itself compensates of its latency.
+        """Return positions' total extrapolation time: age and what the aircraft compensates itself.
 
         Without a velocity of theirs nobody carries them on, and they are as old as they are.
         """

@@ -130,9 +130,7 @@ class ElevationRaster:
     def heights_and_coverage(
         self, lat_deg: FloatArray, lon_deg: FloatArray
     ) -> tuple[FloatArray, npt.NDArray[np.bool_]]:
-        """Return ground heights (m; -inf outside the raster) at positions, and a mask that is True
-        where the position lies on the raster.
-        """
+        """Return ground heights (m; -inf outside the raster) and which positions are on it."""
         rows, columns = self.height_m.shape
         v, u = self.fractional_row_and_column(lat_deg, lon_deg)
         inside = (v >= -_EDGE) & (v <= rows - 1 + _EDGE) & (u <= columns - 1 + _EDGE)

@@ -37,9 +37,7 @@ _AXIS_RATIO = float(np.sqrt(1.0 - ECCENTRICITY_SQUARED))
 
 
 def ray_curvature_share(refraction: str) -> float:
-    """Return the curvature of a horizontal ray divided by the Earth's, for a refraction model by
-    name; ValueError if unknown.
-    """
+    """Return a level ray's curvature over Earth's by refraction model; ValueError if unknown."""
     if refraction not in REFRACTIONS:
         raise ValueError(
             f"refraction is {refraction!r}: it must be one of {', '.join(REFRACTIONS)}"
@@ -50,8 +48,7 @@ def ray_curvature_share(refraction: str) -> float:
 def refracted_elevation_rad(
     elevation_rad: Any, range_m: Any, refraction: str = "four_thirds"
 ) -> Any:
-    """Return the apparent elevation (rad, at most pi/2) of a refracted ray whose straight chord has
-    this elevation and length.
+    """Return a refracted ray's apparent elevation (rad, <= pi/2) by chord elevation and length.
 
     The ray is an arc with a quarter of the Earth's curvature, less the steeper it is: it leaves
     its chord by D cos(elevation) / (8 R), 0.022° at 20 km.
@@ -235,9 +232,7 @@ def is_behind_terrain(
 
 
 def max_ground_above_clear_ray_m(raster: ElevationRaster) -> float:
-    """Return an upper bound, m, of how far ground may rise above a ray that is judged to be clear
-    of it.
-    """
+    """Return an upper bound, m, of how far ground may rise above a ray judged clear of it."""
     # Second derivative 2 · twist, twist at most twice the largest step; an eighth of the squared
     # distance of points a thirty-second of a cell apart. The same of the Earth's curvature.
     return (
@@ -292,9 +287,7 @@ def _shares_of_grid_crossings(
     piece: FloatArray,
     raster: ElevationRaster,
 ) -> list[FloatArray]:
-    """Return, as fractions of the ray's length, where pieces of rays cross a row and a column of
-    the raster, at which the ground may have an edge.
-    """
+    """Return where pieces of rays cross a raster row and column, as fractions of the ray."""
     ends = []
     for side in (-0.5, 0.5):
         lat_rad, lon_deg, _ = rays.points_at_shares(share + side * piece, ray)

@@ -103,16 +103,12 @@ def true_target_positions_km(
 
 
 def reported_positions_km(rows: dict[str, AnyArray]) -> tuple[FloatArray, FloatArray]:
-    """Return the east and north positions in km that measured azimuth, elevation and range give for
-    a level ownship heading north.
-    """
+    """Return east, north, km, by azimuth, elevation, range of a level ownship heading north."""
     ground_km = rows["range_m"] / 1000.0 * np.cos(rows["elevation_rad"])
     return ground_km * np.sin(rows["azimuth_rad"]), ground_km * np.cos(rows["azimuth_rad"])
 
 
 def line_from_ownship(azimuth_deg: float, length_km: float) -> tuple[list[float], list[float]]:
-    """Return the east and north coordinates (km) of both ends of a line that starts at the ownship
-    in the direction of an azimuth.
-    """
+    """Return east and north (km) of both ends of a line from the ownship along an azimuth."""
     angle = math.radians(azimuth_deg)
     return [0.0, length_km * math.sin(angle)], [0.0, length_km * math.cos(angle)]

@@ -125,9 +125,7 @@ def pd_over_snr(_: Cells) -> Made:
 
 
 def snr_and_pd_over_range(name: str, figure: str, thesis: Printed, _: Cells) -> Made:
-    """Figs 4.3 to 4.5: rows and figure of SNR and Pd of one RCS class over range; `thesis` is the
-    Pd printed in §4.1.3.
-    """
+    """Figs 4.3 to 4.5: rows, figure of SNR, Pd of an RCS class over range; `thesis`: §4.1.3 Pd."""
     rcs_dbsm, average_km = CLASSES[name]
     sensor = radar_parameters()
     budget = sensor.link_budget()

@@ -56,9 +56,7 @@ def reproduce_items(
 
 
 def make_items(wanted: list[Item]) -> tuple[Results, list[str]]:
-    """Compute the items; return those that succeeded with their results, and a sentence for each
-    failure.
-    """
+    """Compute the items; return those that succeeded with results, and a sentence per failure."""
     results: Results = []
     failures = []
     for item in wanted:
@@ -181,7 +179,7 @@ def _markdown_section(item: Item, made: Made, images: str) -> str:
     extra = (" derived |", " ---: |") if derived else ("", "")
     lines += [f"| quantity | printed |{extra[0]} ours | difference | unit | verdict | from |"]
     lines += [f"| --- | ---: |{extra[1]} ---: | ---: | --- | --- | --- |"]
-    said = footnote_letters_by_text(made.rows)
+    said = letters_of_repeated_texts(made.rows)
     lines += [markdown_table_row(row, derived, said) for row in made.rows]
     lines.append("")
     if said:
@@ -193,10 +191,8 @@ def _markdown_section(item: Item, made: Made, images: str) -> str:
     return "\n".join(lines)
 
 
-def footnote_letters_by_text(rows: Sequence[Row]) -> dict[str, str]:
-    """Return the footnotes of texts that several rows would repeat: by text its letter in
-    brackets.
-    """
+def letters_of_repeated_texts(rows: Sequence[Row]) -> dict[str, str]:
+    """Return footnotes' letters in brackets, by text, for texts that several rows would repeat."""
     said: Counter[str] = Counter()
     for row in rows:
         said.update([*row.source_sentences, *([row.because] if row.verdict == DIFFERS else [])])

@@ -98,9 +98,7 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """Return how our number compares with the printed one; ValueError without basis or due
-        reason.
-        """
+        """Return how our number compares with print; ValueError without basis or due reason."""
         if self.printed is None:
             return SILENT
         if self.basis is None:
@@ -201,9 +199,7 @@ Columns = Mapping[str, Sequence[Any] | Any]
 
 
 def tally_sentence(rows: Sequence[Row], mark: str = "") -> str:
-    """Return a sentence that counts rows by verdict and lists agreeing predictions; `mark` encloses
-    names.
-    """
+    """Return a sentence: row counts by verdict, agreeing predictions; `mark` encloses names."""
     verdicts = [row.verdict for row in rows]
     counts = ", ".join(f"{verdicts.count(name)} {mark}{name}{mark}" for name in VERDICTS)
     agree = [row.quantity for row in rows if row.is_agreeing_prediction]

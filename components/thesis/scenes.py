@@ -64,9 +64,7 @@ def aircraft(name: str) -> Aircraft:
 
 
 def silhouette_area_keywords(name: str, band: str = "eo") -> dict[str, Any]:
-    """Return an aircraft's areas (m²) in one band, eo or ir, by keyword of the silhouette
-    models.
-    """
+    """Return an aircraft's areas (m²) in band eo or ir, by keyword of the silhouette models."""
     result: dict[str, Any] = getattr(aircraft(name), band).model_dump(
         exclude={"silhouette_table", "made_for"}
     )

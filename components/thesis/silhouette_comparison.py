@@ -86,8 +86,7 @@ class RotationComparison:
 def camera_angles_over_half_turn(
     axis: str, step_deg: float = 10.0
 ) -> tuple[FloatArray, tuple[FloatArray, FloatArray, FloatArray, FloatArray]]:
-    """Return angles from 0 to 180° and, for each, the target's relative heading, pitch, roll and
-    the camera's elevation (rad) about one body axis.
+    """Return angles to 180° about an axis; relative heading, pitch, roll, camera elevation, rad.
 
     x: from the right wing over the top to the left wing. y: from the nose over the top to the
     tail. z: from the nose past the right wing to the tail. The target stays level; only the line

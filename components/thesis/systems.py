@@ -47,9 +47,7 @@ class Errors:
     def mean_and_deviation_by_range(
         self, values: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return the centre (km) of each 1 km range bin with at least two values, and mean and
-        standard deviation of the values there.
-        """
+        """Return centres (km) of 1 km range bins with two values or more, mean and deviation."""
         index = np.digitize(self.range_km, _EDGES_KM) - 1
         bins = [number for number in range(len(_EDGES_KM) - 1) if np.sum(index == number) > 1]
         mean = np.array([values[index == number].mean() for number in bins])

@@ -43,9 +43,7 @@ _TRACKS = 64
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return the positions (rows, tracks, 3) of fused tracks in m, and their standard deviation
-    (rows, tracks) in m, for a ladder of models.
-    """
+    """Return fused tracks' positions (rows, tracks, 3), standard deviations (rows, tracks), m."""
     position = np.full((len(wake), _TRACKS, 3), np.nan)
     spread = np.full((len(wake), _TRACKS), np.nan)
     reported: Any = block.run(wake)
@@ -213,9 +211,7 @@ class CovarianceIntersection(Component):
         )
 
     def _select_newest_reports(self, new: Arrivals, wake: Wake) -> Arrivals:
-        """Return the reports to use: a tracker's last of each instant, none older than one that
-        came before.
-        """
+        """Return the reports to use: each tracker's last per instant, and none out of order."""
         made, replica = new.message.tick, new.message.run
         newest = self._newest.get(new.source, np.empty(0, dtype=np.int64))
         more = max(int(replica[-1]) + 1 - len(newest), 0)

@@ -27,8 +27,7 @@ from dsa_des.block.message import offsets_from_entry_rows
 def fuse_states(
     tracks: LocalTracks, time_s: FloatArray, motion: ConstantVelocity, rule: Rule
 ) -> KeyedTable:
-    """Return a table of fused tracks, one for each group of tracks with the same replica and
-    number, with state, covariance and status.
+    """Return a table of fused tracks (state, covariance, status), one per replica and number.
 
     ``existence`` is the largest of any member: as much is sure whatever they have in common.
     ``newest`` is the index of the member that gives the direction where there is no range; there

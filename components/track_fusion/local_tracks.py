@@ -51,15 +51,11 @@ class LocalTracks(KeyedTable):
     def states_and_covariances_at(
         self, time_s: FloatArray, motion: ConstantVelocity
     ) -> tuple[FloatArray, FloatArray]:
-        """Return states (6, n) and covariances (6, 6, n) predicted to instants, s, not before the
-        tracks' own.
-        """
+        """Return states (6, n), covariances (6, 6, n) at times (s) not before the tracks' own."""
         return motion.predict(self.state, self.covariance, time_s - self.time_s)
 
     def with_fused_numbers_from(self, old: Self) -> Self:
-        """Return these tracks with the fused track number that each has in `old`; 0 if it is not in
-        there.
-        """
+        """Return these tracks with the fused track numbers that they have in `old`, 0 if none."""
         if len(old) == 0 or len(self) == 0:
             return self
         known = old.unique_numbers()
@@ -158,8 +154,7 @@ def initial_records(replicas: IntArray) -> KeyedTable:
 def records_with_newest_instants(
     records: KeyedTable, new: LocalTracks, on_board: BoolArray
 ) -> KeyedTable:
-    """Return records updated by new tracks: each replica's newest instant, and the ownship's
-    position.
+    """Return records with each replica's newest instant and ownship position from new tracks.
 
     `on_board` says of each tracker whether it is.
     """

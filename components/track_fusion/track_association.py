@@ -51,9 +51,7 @@ class Bearing:
 
 
 def linearised_direction(tracks: LocalTracks, state: FloatArray, time_s: FloatArray) -> Bearing:
-    """Return, for each track that gives a direction, the residual, Jacobian and variance of that
-    direction with respect to a state at another instant.
-    """
+    """Return direction tracks' residual, Jacobian and variance for a state at another instant."""
     back_s = tracks.time_s - time_s
     then = state.copy()
     then[:3] += back_s * state[3:]
@@ -136,9 +134,7 @@ def _squared_bearing_distances(
 
 
 def leader_indices(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
-    """Return the index of each fused track's leading track, and for each track the place in that
-    array.
-    """
+    """Return the index of each fused track's leader, and each track's place in that array."""
     order = np.lexsort((tracks.tracker, ~tracks.ranged, tracks.system, tracks.replica))
     replica, system = tracks.replica[order], tracks.system[order]
     first = np.ones(len(order), dtype=bool)
@@ -151,9 +147,7 @@ def leader_indices(tracks: LocalTracks) -> tuple[IntArray, IntArray]:
 def reset_numbers_of_strays(
     rules: MatchRules, tracks: LocalTracks, time_s: FloatArray
 ) -> LocalTracks:
-    """Return the tracks, where those now too far from their fused track's leader get number 0
-    (none).
-    """
+    """Return the tracks; those too far from their fused track's leader get number 0 (none)."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return tracks
@@ -178,8 +172,7 @@ def assign_fused_numbers(
     next_number: IntArray,
     replica: IntArray,
 ) -> tuple[LocalTracks, IntArray]:
-    """Return the tracks with a fused track number each, kept or new, and each replica's next free
-    number.
+    """Return tracks with a fused number each, kept or new, and each replica's next free number.
 
     Tracker by tracker, its tracks that belong nowhere, or stand alone, are assigned to the fused
     tracks that have none of it: the least sum of distances, none beyond its gate. One that stands
@@ -222,9 +215,7 @@ def _assign_to_fused_tracks(
     time_s: FloatArray,
     system: IntArray,
 ) -> None:
-    """Write into `system` the fused track that each free track of one tracker is assigned to, if
-    one is near enough.
-    """
+    """Write into `system` the fused track of each free track of one tracker, if near enough."""
     member = np.flatnonzero(tracks.system > 0)
     if len(member) == 0:
         return

@@ -109,9 +109,7 @@ class Association(Protocol):
     """Decides which detections belong to which tracks."""
 
     def update(self, pairs: Candidates) -> Associated:
-        """Return the tracks updated by detections in gates, a mask of tracks hit, and the gains of
-        their score.
-        """
+        """Return tracks updated by detections in gates, which were hit (mask), and score gains."""
         ...
 
 
@@ -251,8 +249,7 @@ ASSOCIATIONS: dict[str, Association] = {
 def correct_nonlinear_updates(
     pairs: Candidates, track: IntArray, one: GatedPairs, pair: IntArray, estimates: Estimates
 ) -> None:
-    """Improve, in place, updates of tracks where a linear update is poor: angle-only tracks, large
-    corrections and coarse bearings.
+    """Improve in place poor linear updates: angle-only tracks, large corrections, coarse bearings.
 
     Those of angle-only tracks are brought into modified polar coordinates, and those that went far
     along a tangent of a precise measurement are repeated. What coarse bearings
@@ -338,9 +335,7 @@ def iterate_far_updates(
 def rotate_coarse_updates(
     part: TrackStore, track: IntArray, own_m_s: FloatArray, pose: SensorPose, estimates: Estimates
 ) -> None:
-    """Replace, in place, updates by coarse bearings by turns about the sensor; none where `own_m_s`
-    is NaN.
-    """
+    """Replace in place coarse-bearing updates by turns about the sensor; not at NaN `own_m_s`."""
     coarse = np.flatnonzero(~np.isnan(own_m_s[0]))
     if not len(coarse):
         return
@@ -355,8 +350,7 @@ def rotate_coarse_updates(
 
 
 def is_arc_bent(part: TrackStore, pose: SensorPose) -> BoolArray:
-    """Return a mask over tracks: True where the spread across the line of sight is so wide that a
-    straight line misses the arc of constant range.
+    """Return which tracks spread too wide for a straight line along the arc of equal range (mask).
 
     At two deviations a straight line leaves it by `_BENT` of the deviation along it.
     """
@@ -378,9 +372,7 @@ def concatenate(parts: Sequence[Any]) -> Any:
 
 
 def _log_least_gate_volume(one: GatedPairs) -> FloatArray:
-    """Return, per pair, ln |S| of the innovation covariance S; the least of several motion
-    models.
-    """
+    """Return, per pair, ln |S| of innovation covariance S; the least of several motion models."""
     result = log_determinant_from_root(one.measured.innovations[0].root)
     for other in one.measured.innovations[1:]:
         result = np.minimum(result, log_determinant_from_root(other.root))

@@ -125,9 +125,7 @@ class Cues(Component):
         return np.flatnonzero(due)
 
     def _cueing_tracks(self, tracks: StateTracks) -> tuple[IntArray, IntArray, FloatArray]:
-        """Return message row, entry index and cone half angle (rad) of each track that is certain
-        enough to send a cone for.
-        """
+        """Return message row, entry and cone half angle (rad) of tracks certain enough for cues."""
         wanted = tracks.track_status != DELETED
         if not self.p.tentative:
             wanted &= tracks.track_status != TENTATIVE

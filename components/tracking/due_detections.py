@@ -63,9 +63,7 @@ class Promises:
         return any(self.steps)
 
     def promised_ticks(self, sensor: int, range_m: FloatArray) -> FloatArray:
-        """Return in how many ticks a sensor promises to report a target at each range again; 0: at
-        every look.
-        """
+        """Return promised ticks until a sensor reports again at each range; 0: every look."""
         if not (steps := self.steps[sensor]):
             return np.zeros(len(range_m))
         far, within_s = np.array(steps).T
@@ -73,9 +71,7 @@ class Promises:
         return np.asarray(within_s[step] * self.ticks_per_s)
 
     def track_life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
-        """Return how many ticks tracks live undetected; `sees` (sensors, n) is True where a sensor
-        sees one.
-        """
+        """Return how many ticks tracks live undetected; `sees` (sensors, n): who sees one."""
         life = np.full(len(range_m), int(LIVES_S * self.ticks_per_s))
         if not self:
             return life
@@ -88,9 +84,7 @@ class Promises:
 
 
 def is_seen_by_sensor(misdetections: IntArray) -> BoolArray:
-    """Return a mask (sensors, tracks): True where a sensor missed a track rarely, or least of all
-    sensors.
-    """
+    """Return where (sensors, tracks) a sensor missed a track rarely, or the least often (mask)."""
     return np.asarray(
         (misdetections < BLIND_AFTER)
         | ((misdetections == misdetections.min(axis=0)) & (misdetections < NEVER))
@@ -148,8 +142,7 @@ def range_or_infinity_m(part: TrackStore, pose: SensorPose) -> FloatArray:
 def update_misdetection_counts(
     misdetections: IntArray, by: IntArray, looked: BoolArray
 ) -> IntArray:
-    """Return the numbers (sensors, tracks) of misdetections since the last hit, updated by a look:
-    one more where looked, 0 where hit.
+    """Return misses (sensors, tracks) since the last hit: one more where looked, 0 where hit.
 
     `by` is the mask of the sensors that updated each track.
     """
@@ -184,8 +177,7 @@ class Silence:
         return self.instants.take(self.rows)
 
     def silent_rows_before_work(self, row: IntArray, worked: IntArray) -> tuple[IntArray, IntArray]:
-        """Return, for each processed row of the wake, the first and last silent row between the
-        run's previous work and this row.
+        """Return, per processed wake row, the first and last silent row since its run's last work.
 
         It is the silent rows from the first to the second: none where the second is less. `worked`
         is when the last work of each one's run was, before this wake.
@@ -214,8 +206,7 @@ class Silence:
     def end_silent_tracks(
         self, store: TrackStore, records: KeyedTable, first: IntArray, last: IntArray
     ) -> tuple[TrackStore, list[TrackStore]]:
-        """Return the tracks that live on, and tables to report of runs where any ended, those as
-        deleted.
+        """Return living tracks, and tables to report of runs where any ended, those as deleted.
 
         Looked through are the tracks of the runs of `records`, at silent rows of each from `first`
         to `last`.

@@ -57,8 +57,7 @@ class GatedPairs:
 def gate_pairs(
     rules: TrackerRules, part: TrackStore, of: IntArray, pose: SensorPose, batch: LookBatch
 ) -> tuple[list[GatedPairs], FloatArray | None, BoolArray]:
-    """Return the gated pairs of tracks and detections for each kind of measurement, the expected
-    directions, and a mask of detections in some gate.
+    """Return gated pairs by kind, expected directions, and which detections are in a gate (mask).
 
     `of` is the look of each track, ascending, and `pose` that look's. Also returned are the
     direction that the first model expects of every track, (2, tracks) in body axes, where it was
@@ -169,8 +168,7 @@ def _track_detection_pairs_in_boxes(
     spread: "_PairVariance",
     few: int,
 ) -> tuple[IntArray, IntArray]:
-    """Return track and detection indices of pairs where the detection lies in the box around the
-    gate.
+    """Return track and detection indices of pairs, the detection in the box around the gate.
 
     Up to so `few` pairs are all returned.
     """
@@ -202,9 +200,7 @@ def _track_detection_pairs_in_boxes(
 
 
 def _entry_and_track_pairs(many: IntArray, first: IntArray) -> tuple[IntArray, IntArray]:
-    """Return entry and track indices of all pairs: entry i with `many[i]` tracks from `first[i]`
-    on.
-    """
+    """Return entry and track indices of pairs: entry i with `many[i]` tracks from `first[i]`."""
     entry = np.arange(len(many)).repeat(many)
     before = many.cumsum() - many
     return entry, np.arange(len(entry)) - (before - first).repeat(many)

@@ -21,8 +21,7 @@ _NEAR_M = 1000.0
 
 
 def measure(block: Component, wake: Wake, reference: Component) -> dict[str, AnyArray]:
-    """Return, at every row and target that was detected, the distance of the nearest confirmed
-    track (m) and its NEES, for a ladder of models.
+    """Return the nearest confirmed track's distance (m) and NEES at each detected row and target.
 
     Rungs have other tracks, so they are compared with the truth and not with each other: at every
     instant at which a target was detected and tracks are reported, the nearest confirmed track with
@@ -84,12 +83,10 @@ def _position_errors_and_lags(
     return position - back_s * velocity - truth_m, np.abs(back_s)
 
 
-def errors_at_reference_cells(
+def position_error_and_nees_at_cells(
     block: Component, wake: Wake, cells: IntArray
 ) -> dict[str, FloatArray]:
-    """Return, by name, position error (m) and NEES of the block's own tracks at (row, target)
-    cells.
-    """
+    """Return, by name, position error (m) and NEES of own tracks at (row, target) cells."""
     row, target = cells.T
     return {name: values[row, target] for name, values in measure(block, wake, block).items()}
 
@@ -113,7 +110,7 @@ FILTER = Ladder(
     "imm",
     _QUANTITIES,
     measure,
-    errors_at_reference_cells,
+    position_error_and_nees_at_cells,
 )  # fmt: skip
 
 ASSOCIATION = Ladder(
@@ -126,7 +123,7 @@ ASSOCIATION = Ladder(
     "jpda",
     _QUANTITIES,
     measure,
-    errors_at_reference_cells,
+    position_error_and_nees_at_cells,
 )
 
 LATENESS = Ladder(
@@ -139,7 +136,7 @@ LATENESS = Ladder(
     "rerun",
     _QUANTITIES,
     measure,
-    errors_at_reference_cells,
+    position_error_and_nees_at_cells,
 )
 
 #: Of every tracker that estimates states.

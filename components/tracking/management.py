@@ -146,7 +146,9 @@ def initiate_tracks(
 def start_estimates(
     rules: TrackerRules, scans: Scans, pose: SensorPose, codes: IntArray, detection: IntArray
 ) -> Estimates:
-    """Return initial states and covariances for all models, from one detection per track."""
+    """Return initial states and covariances of all models, weighted alike: one track per entry of
+    `detection` (index into the scans' detections), whose kind `codes` has.
+    """
     count = len(detection)
     measured, variance = (
         select_tracks(scans.measured[:3], detection),
@@ -276,8 +278,7 @@ def _advise_on_late_looks(late: bool) -> str:
 def last_seen_columns(
     rules: TrackerRules, part: TrackStore, pose: SensorPose, mask: IntArray
 ) -> dict[str, Any]:
-    """Return columns of where and when each sensor last saw each track, updated for sensors in
-    `mask`.
+    """Return where and when each sensor last saw each track, updated for sensors in `mask`.
 
     Nothing is kept of sensors all of whose errors are new.
     """

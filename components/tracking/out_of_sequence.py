@@ -101,8 +101,7 @@ class Past:
 def plan_with_late_looks(
     scans: Scans, of: IntArray, begin: int, lag_ticks: int, *, rerun: bool
 ) -> tuple[Plan, list[int], list[int]]:
-    """Return the plan of steps with late looks in it, the looks that are too late and left out, and
-    the looks to keep afterwards.
+    """Return the plan of steps including late looks, looks too late (left out), and looks to keep.
 
     Looks before `begin` are those remembered; `of` is the index of each one's replica. With `rerun`
     late looks have all since them worked on again, else they are worked on in one step.
@@ -146,9 +145,7 @@ def plan_with_late_looks(
 
 
 def plan_without_late_looks(scans: Scans, of: IntArray, newest: IntArray) -> tuple[Plan, list[int]]:
-    """Return the plan of steps in order of arrival, and the looks left out because a newer one of
-    their replica came first.
-    """
+    """Return the plan in order of arrival, and looks left out as their replica had a newer one."""
     so_far = RunTicks(of, scans.tick).running_largest_tick().tick
     keep = (scans.tick >= so_far) & (scans.tick >= newest[of])
     look = np.flatnonzero(keep)

@@ -28,9 +28,7 @@ _COARSEST_DEG = 5.0
 
 
 def sensors_by_told_error(offers: Mapping[str, Any]) -> dict[tuple[ToldError, str], list[str]]:
-    """Return, for each error that sensors state, the names of the sensors that have it; an error of
-    the aircraft itself is listed once.
-    """
+    """Return sensor names by stated error; an error of the aircraft itself is listed once."""
     result: dict[tuple[ToldError, str], list[str]] = {}
     for name, offer in sorted(offers.items()):
         for one in offer.told_errors if isinstance(offer, SensorOffer) else ():
@@ -61,9 +59,7 @@ def folded_range_warnings(offers: Mapping[str, Any]) -> list[str]:
 
 
 def coarse_bearing_warnings(offers: Mapping[str, Any]) -> list[str]:
-    """Return a warning for each sensor whose azimuth errors are so large beside its precise ranges
-    that tracks become overconfident.
-    """
+    """Return a warning per sensor making tracks overconfident: coarse azimuth, precise range."""
     return [
         f"azimuths of {name} have an error of {math.degrees(math.sqrt(variance)):.3g}°: beside a "
         "precise range they leave a target on an arc, which no Gaussian along straight axes is, "
@@ -106,16 +102,12 @@ class CarriedErrors:
         )
 
     def ownship_velocity_m_s(self, scans: Scans, cells: IntArray) -> FloatArray:
-        """Return the ownship's velocity (3, n), north, east, down, as reported with chosen
-        detections; NaN unless the bearing is coarse.
-        """
+        """Return reported ownship velocity (3, n), NED; NaN unless the bearing is coarse."""
         assert scans.reported is not None
         return scans.reported[TOLD.index("own_north") : TOLD.index("own_down") + 1, cells]
 
     def new_error_variances(self, scans: Scans, cells: IntArray, rows: list[int]) -> FloatArray:
-        """Return variances of the errors new at each look; the first three rows: of position,
-        equal, in m².
-        """
+        """Return variances of errors new at each look, the first three of position, equal, m²."""
         assert scans.reported is not None
         variance = scans.variance[rows][:, cells]
         variance[:3] = scans.reported[TOLD.index("white_variance"), cells]
@@ -124,9 +116,7 @@ class CarriedErrors:
     def position_and_velocity_ages(
         self, scans: Scans, cells: IntArray, since_s: FloatArray
     ) -> Ages:
-        """Return ages of reported positions and velocities, times since track updates, and
-        positions' lag, s.
-        """
+        """Return ages of positions and velocities, times since track updates, position lags, s."""
         assert scans.reported is not None
         position, velocity, late = (scans.reported[TOLD.index(name), cells] for name in _AGES)
         return Ages(position, velocity, since_s, late)
@@ -135,9 +125,7 @@ class CarriedErrors:
 def variances_of_azimuth_elevation_range(
     variance_m2: FloatArray, measured: FloatArray
 ) -> FloatArray:
-    """Return variances across, up and along the line of sight (m²) converted to azimuth (rad²),
-    elevation (rad²) and range (m²).
-    """
+    """Convert variances across, up, along sight (m²) to azimuth, elevation (rad²), range (m²)."""
     result, distance = variance_m2.copy(), np.maximum(measured[2], 1.0)
     level = np.maximum(np.cos(measured[1]), _LEAST_COS)
     result[0] /= (distance * level) ** 2

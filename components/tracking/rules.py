@@ -63,9 +63,7 @@ class LastingErrors:
 
     @cached_property
     def is_correlated(self) -> BoolArray:
-        """Mask over sensors: True where any error stays correlated from look to look; one more
-        False at the end stands for no sensor.
-        """
+        """Mask over sensors: any error is correlated between looks; a last False for no sensor."""
         parts = (self.variance != 0.0) | (self.across_m2 != 0.0) | (self.share != 0.0)
         return np.append((self.step != 0.0).any(axis=0) | parts.any(axis=(0, 1)), False)
 
@@ -91,9 +89,7 @@ class LastingErrors:
         since_s: FloatArray,
         range_m: FloatArray,
     ) -> FloatArray:
-        """Return covariances of errors with those of the same sensor's last measurement of the same
-        track.
-        """
+        """Return error covariances with those of the sensor's last measurement of that track."""
         at = _OF_ROW[rows][:, np.newaxis] * self.step.shape[1] + source
         step, seen = self.step.take(at), np.isfinite(since_s)
         rounding = step * step / 12.0
@@ -336,17 +332,13 @@ class TrackerRules:
         return int(LIVES_S * self.ticks_per_s)
 
     def track_life_ticks(self, sees: BoolArray, range_m: FloatArray) -> IntArray:
-        """Return how many ticks tracks live undetected; `sees` (sensors, n) is True where a sensor
-        sees one.
-        """
+        """Return how many ticks tracks live undetected; `sees` (sensors, n): who sees one."""
         if self.p.delete_after_s is not None:
             return np.full(len(range_m), int(self.p.delete_after_s * self.ticks_per_s))
         return self.promises.track_life_ticks(sees, range_m)
 
     def initial_extra_state_deviation(self, size: int) -> float:
-        """Return the initial standard deviation of the extra state of a model: turn rate (rad/s) if
-        it has 7 states, else acceleration (m/s²).
-        """
+        """Return the initial deviation of turn rate (rad/s; 7 states) or acceleration (m/s²)."""
         if size == 7:
             return math.radians(getattr(self.p, "start_turn_deg_s", 3.0))
         return float(getattr(self.p, "start_acceleration_m_s2", 3.0))

@@ -99,8 +99,7 @@ def tracks_after_late_looks(
     *,
     unless_updated: bool,
 ) -> tuple[TrackStore, IntArray, BoolArray]:
-    """Return the tracks after one late look of each of some replicas, their next track numbers, and
-    a mask of the looks left out.
+    """Return tracks after one late look of some replicas, next numbers and left-out looks (mask).
 
     A look is late for the tracks that speak of a later instant. Those that were there before it,
     as in `before`, are taken back to it by what they were then, those that are newer by what they
@@ -167,9 +166,7 @@ def _match_earlier_tracks(
 def _retrodict(
     rules: TrackerRules, now: TrackStore, old: TrackStore | None, tick: IntArray
 ) -> tuple[TrackStore, list[Retrodiction], FloatArray]:
-    """Return the tracks predicted back to a past instant, the retrodictions, and model
-    probabilities.
-    """
+    """Return tracks predicted back to a past instant, retrodictions and model probabilities."""
     since_s = (now.tick - tick) / rules.ticks_per_s
     present = zip(
         rules.estimator.models, now.states_by_model(), now.covariances_by_model(), strict=True

@@ -136,9 +136,7 @@ class TrackerStub(Component):
         return self._tracks(fused, wake, updated, targets, last, pool, first)
 
     def _target_measurements(self, wake: Wake) -> tuple[FusedDetections | None, IntArray]:
-        """Return the received measurements without false alarms (or None), and the number of fused
-        entries at each row of the wake.
-        """
+        """Return received target measurements (or None), and numbers of fused entries per row."""
         busy = wake.without_idle()
         fused = self._nothing if busy is None else busy["fused"]
         counts = np.zeros(len(wake), dtype=np.int64)
@@ -239,9 +237,7 @@ def _pool_kept_and_new(
 def _present_targets_and_columns(
     held: IntArray, new: IntArray, targets: int
 ) -> tuple[IntArray, IntArray]:
-    """Return the indices of targets with a kept or new measurement, ascending, and for every target
-    its column among them.
-    """
+    """Return targets with a kept or new measurement, ascending, and each target's column there."""
     there = np.zeros(targets, dtype=bool)
     there[held] = True
     there[new] = True

@@ -134,8 +134,7 @@ def estimate_columns(estimates: Estimates) -> dict[str, AnyArray]:
 
 
 def initial_records(replica: IntArray, position_deg_m: FloatArray) -> KeyedTable:
-    """Return a table with one initial record per run, whose frame has its origin at the ownship's
-    position at the first look.
+    """Return a record per run, its frame's origin at the ownship's position at the first look.
 
     ``own`` is where the ownship was at the last one, in the frame with that ``origin``, and
     ``worked_tick`` is when that came.

@@ -354,9 +354,7 @@ class Tracker(Component):
         works: IntArray,
         before: dict[int, Snapshot],
     ) -> TrackStore:
-        """Return the tracks, set back to before a late look where the plan asks for it, and save a
-        snapshot before each look.
-        """
+        """Return tracks, set back before late looks where planned; save a snapshot before each."""
         late = works[plan.back_to[works] >= 0]
         if len(late):
             of, back = plan.of[late], plan.back_to[late].tolist()
@@ -373,8 +371,6 @@ class Tracker(Component):
         return store
 
     def report(self) -> dict[str, Any]:
-        """Return late looks by sensor, and how many looks arrived before the instant they were
-        made.
-        """
+        """Return late looks by sensor, and how many looks arrived before they were made."""
         late = {self.name: self._count.late_look_statistics()}
         return {"late_looks": late, "early_looks": {self.name: self._early}}

@@ -45,9 +45,7 @@ class Box(Parameters):
         return self
 
     def south_north_west_east_deg(self) -> tuple[float, float, float, float]:
-        """Return the southern, northern, western and eastern limit in degrees, where the eastern
-        exceeds the western (above 180 if need be).
-        """
+        """Return south, north, west and east limit, deg; the east > west, over 180 if needed."""
         east = self.east_deg
         while east <= self.west_deg:
             east += 360.0

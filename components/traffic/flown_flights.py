@@ -73,9 +73,7 @@ class OfPlatforms(Fleet):
     def _split_ownships_and_targets(
         self, aircraft: IntArray
     ) -> tuple[IntArray, IntArray, IntArray]:
-        """Return the positions of the ownships among the given flights, those of the targets, and
-        the index of each such target in the target fleet.
-        """
+        """Return positions in the flights of ownships, of targets, and the targets' fleet index."""
         place, run = np.divmod(aircraft, self._runs)
         targets = place.nonzero()[0]
         of = run[targets] * self._width + self._platforms[place[targets]]
@@ -225,9 +223,7 @@ class FlownFlights:
 
     @property
     def traffic(self) -> object:
-        """The target fleet: the same object for all flights of one traffic block, and so its
-        identity.
-        """
+        """The target fleet: one object for all flights of a traffic block, and so its identity."""
         return self.targets
 
     @property
@@ -243,9 +239,7 @@ class FlownFlights:
         return tuple(index for index, many in of_each if index >= 0 and many)
 
     def viewer_and_target_fleets(self, viewer: int) -> tuple[Fleet, Fleet]:
-        """Return the flights of a viewing platform, and those of all targets with the ownship in
-        the viewer's place, both without manoeuvres.
-        """
+        """Return a viewer's flights and all targets', ownship in its place, without manoeuvres."""
         if viewer < 0:
             return self.nominal_flights(viewer), self.targets
         others = {viewer: self.nominal_flights(-1)}
@@ -325,8 +319,7 @@ class FlownFlights:
     def compute_if_arrays_changed(
         self, name: str, of: Sequence[AnyArray], make: Callable[[], Any]
     ) -> Any:
-        """Return the value stored under a name if it was made for equal arrays, else call `make`
-        and store its result in place of the last one.
+        """Return a name's stored value if arrays are equal, else call `make` and store instead.
 
         Those who look from several platforms ask for the same of all aircraft.
         """

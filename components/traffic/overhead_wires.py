@@ -45,9 +45,7 @@ class OverheadWire(Parameters):
     )
 
     def piece_intruder_keys(self) -> Iterator[dict[str, Any]]:
-        """Yield each piece of the wire as a dictionary of an intruder's keys: position, radar and
-        laser properties, no camera areas.
-        """
+        """Yield each piece as a dict of intruder keys: position, radar, laser; no camera areas."""
         posts = np.array([[post.east_m, post.north_m, post.up_m] for post in self.posts])
         ends = [catenary_points_m(a, b, self.sag_m, self.piece_m) for a, b in pairwise(posts)]
         spans = [(line[:-1], line[1:]) for line in ends]

@@ -216,7 +216,9 @@ class RecordedTraffic(TrafficSource):
             return content
         blows = (0.0, 0.0) if wind is None else (wind.east_mps, wind.north_mps)
         own, *intruders = (
-            craft.with_attitude_in_wind(*blows, self.p.height_above_ellipsoid_m(air, craft.alt_m))
+            craft.with_derived_angles_in_wind(
+                *blows, self.p.height_above_ellipsoid_m(air, craft.alt_m)
+            )
             for craft in content.aircraft
         )
         return replace(content, ownship=own, intruders=intruders)

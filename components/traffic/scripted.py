@@ -311,9 +311,7 @@ def _intruder_fleet(
 
 
 def _start_positions(crafts: Sequence[Intruder], references: FloatArray) -> FloatArray:
-    """Return start latitudes, longitudes and heights (n, 3) of intruders, whose offsets count from
-    a reference position (n, 3) each.
-    """
+    """Return intruders' start latitude, longitude, height (n, 3), offset from references (n, 3)."""
     starts: FloatArray = np.zeros((len(crafts), 3))
     relative = np.zeros(len(crafts), dtype=bool)
     for number, craft in enumerate(crafts):

@@ -18,8 +18,8 @@ from components.flights.attitude import Wind, scene_wind
 from components.flights.bounds import (
     FlightAt,
     TrafficEnvelope,
-    check_above_raster_ground,
     check_above_terrain,
+    check_over_raster_above_ground,
     traffic_envelope,
 )
 from components.flights.closest_approach import (
@@ -233,7 +233,9 @@ class TrafficSource(Component):
         if terrain is not None and terrain.height_m is not None:
             check_above_terrain(own_at, terrain.height_m, end_s)
         if terrain is not None and terrain.raster is not None:
-            check_above_raster_ground(own_at, terrain.raster.raster, terrain.raster_zero_m, end_s)
+            check_over_raster_above_ground(
+                own_at, terrain.raster.raster, terrain.raster_zero_m, end_s
+            )
 
     @classmethod
     def prepare(cls, parameters: Sequence[Any]) -> None:
@@ -320,9 +322,7 @@ class TrafficSource(Component):
         )
 
     def _apply_manoeuvres(self, wake: Wake, run: IntArray) -> IntArray:
-        """Add the manoeuvres received to the flights of their platforms; return how many each
-        platform has flown by each row (rows, platforms).
-        """
+        """Add received manoeuvres to platforms' flights; return counts flown (rows, platforms)."""
         self._pending = Coming.concatenate([self._pending, *arrived_manoeuvres(wake, self._steers)])
         flown = self._flown
         fleet, runs = flown.fleet, flown.runs
@@ -385,8 +385,7 @@ class TrafficSource(Component):
         return {"targets": self.closest_approaches()}
 
     def closest_approaches(self, platform: str = "") -> dict[str, Any]:
-        """Return the time and range of the closest approach of each aircraft that a platform (by
-        default the ownship) may see, by name.
+        """Return, by name, time and range of closest approach of aircraft that a platform may see.
 
         By default that is the ownship. ``at`` says where it is the first or the last instant that
         was looked at: the aircraft may have been nearer before, or come nearer after.

@@ -19,9 +19,7 @@ from dsa_des.time.clock import MAX_TICK
 def platform_index_by_steerer(
     producers: Sequence[Producer], index: Callable[[str], int], unseen: Collection[int]
 ) -> dict[str, int]:
-    """Return, by name of the steering block, the index of the platform that it steers; ValueError
-    if two blocks steer one platform.
-    """
+    """Return steered platforms' indices by steering block; ValueError if two steer the same."""
     steering: dict[int, str] = {}
     for producer in producers:
         platform = index(producer.platform)
@@ -87,8 +85,7 @@ def split_due_manoeuvres(wake: Wake, pending: Coming) -> tuple[Coming, Coming]:
 def add_due_manoeuvres(
     fleet: SteeredFleet, flights: IntArray, due: Coming, wake: Wake, each: IntArray
 ) -> tuple[SteeredFleet, IntArray]:
-    """Return the fleet with the due manoeuvres added to `flights`, and the number of manoeuvres
-    known at each row (rows, platforms).
+    """Return the fleet with due manoeuvres in `flights`, and the number known (rows, platforms).
 
     `each` (rows, platforms) are the flights that a row speaks of. It knows the manoeuvres that have
     come by its own instant, whatever came later in this wake.

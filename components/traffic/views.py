@@ -140,17 +140,13 @@ class Seen:
             self.columns = np.unique(np.concatenate([columns, viewers, *others]))
 
     def visible_to_ownship(self, there: BoolArray) -> tuple[BoolArray, IntArray | None]:
-        """Return a mask (rows, targets), True where the ownship may see the target, and how many
-        targets are left out per row (None if none).
-        """
+        """Return visible targets (mask (rows, targets)) and the left-out count per row, or None."""
         return self._visible_to(-1, there, self.own.present)
 
     def visible_to_other_platforms(
         self, there: BoolArray, names: Sequence[str]
     ) -> Mapping[str, tuple[BoolArray, IntArray | None]]:
-        """Return, by platform name, a mask (rows, targets) that is True where it may see the
-        target, and the number left out per row.
-        """
+        """Return by platform whom it may see (rows, targets) and the number left out per row."""
         result = {}
         for view in self._views[1:]:
             place = int(np.searchsorted(self.columns, view.viewer))

@@ -12,7 +12,7 @@ from components.display.picture_plane import (
     LINE,
     TangentPlane,
     bearings_and_end_points,
-    offset_positions,
+    geodetic_from_ned_offsets,
 )
 from components.display.recorded_run import POSE, RecordedTables, read_table
 from components.display.symbols import block_marks, platform_colours, recolour_by_platform
@@ -234,9 +234,7 @@ class _Poses:
         self._known: dict[str | None, tuple[FloatArray, FloatArray]] = {}
 
     def of(self, platform: str | None) -> tuple[FloatArray, FloatArray]:
-        """Return the times and poses (6, n) of a platform (None for the ownship): true ones if
-        recorded, else those it believed.
-        """
+        """Return times and poses (6, n), true if recorded, else believed; None: the ownship's."""
         if platform not in self._known:
             self._known[platform] = self._read(platform)
         return self._known[platform]
@@ -328,7 +326,7 @@ def _track_estimate_columns(
 
     time_s = column("time_s")
     origin = run.stack_columns("state_tracks", ORIGIN, keep)
-    ends = offset_positions(run.stack_columns("state_tracks", POSITION, keep), origin)
+    ends = geodetic_from_ned_offsets(run.stack_columns("state_tracks", POSITION, keep), origin)
     east, north = plane.east_north_m(*ends)
     from_east, from_north = plane.east_north_m(*poses.at("state_tracks", time_s, keep)[:3])
     turned = plane.north_direction_rad(origin)
@@ -367,8 +365,7 @@ def _latest_pose_at(own_s: FloatArray, own: FloatArray, time_s: FloatArray) -> F
 def _line_of_sight_columns(
     run: RecordedTables, table: str, pose: FloatArray, plane: TangentPlane
 ) -> dict[str, AnyArray]:
-    """Return columns with the origin, bearing from north, elevation and range of measured lines of
-    sight, and their end points; NaN if unknown.
+    """Return sight lines' columns: origin, bearing, elevation, range, end points; NaN if unknown.
 
     Bearings are from north; what is not known is NaN.
     """

@@ -101,8 +101,7 @@ def integrated_acquisition_rate(
 def search_round_look_probability(
     closing_mps: float, *, from_m: float, to_m: float, round_s: float, looking: float = 1.0
 ) -> float:
-    """Return the chance that a search, once per `round_s`, looks at an aircraft from `from_m` to
-    `to_m`.
+    """Return the chance that a search per `round_s` looks at an aircraft from `from_m` to `to_m`.
 
     The place of the aircraft is looked at once in `round_s`, at a phase that is as likely as any
     other; it shows from `from_m` on and must be seen by `to_m`. `looking` is the probability that
@@ -151,9 +150,7 @@ def integrate_rate_while_shown(
 def _shown_intervals(
     before_s: FloatArray, shown: AtInstants
 ) -> tuple[IntArray, FloatArray, FloatArray]:
-    """Return the intervals in which a target shows, as three arrays: index of the cell, begin and
-    end in s (0 is now, earlier is negative).
-    """
+    """Return shown intervals: index of the cell, begin, end (s; 0 is now, earlier negative)."""
     count = len(before_s)
     part = before_s / _SUBINTERVALS
     ends = [-before_s + k * part for k in range(_SUBINTERVALS)] + [np.zeros(count)]
@@ -182,9 +179,7 @@ def _visibility_change_s(
     last: BoolArray,
     shown: AtInstants,
 ) -> FloatArray:
-    """Return when (s), from `left` to `right`, visibility changes, by halving; `right` if it does
-    not.
-    """
+    """Return when (s), from `left` to `right`, visibility changes, by halving; else `right`."""
     edge = right.copy()
     which = np.flatnonzero(first != last)
     low, high = left[which], right[which]

@@ -272,9 +272,7 @@ class Lookout(Sensor):
         ]
 
     def look(self, cells: Cells) -> Look:
-        """Draw new acquisitions since the last scan, and return a look that detects every acquired
-        aircraft still large enough to see.
-        """
+        """Draw acquisitions; return a look that detects all acquired still large enough to see."""
         who = cells.run * len(cells.roster.names) + cells.target
         missing = int(who.max(initial=-1)) + 1 - len(self._first_seen)
         if missing > 0:
@@ -369,17 +367,13 @@ class Lookout(Sensor):
         return met
 
     def _since_last_scan_s(self, cells: Cells, which: IntArray) -> FloatArray:
-        """Return the time since the last scan, s, at most since the start of the run; always a scan
-        period if the option is as_at_scan.
-        """
+        """Return time, s, since the last scan or the run's start; a scan period if as_at_scan."""
         if self.p.between_scans == "as_at_scan":
             return np.full(len(which), self._period_s)
         return np.minimum(self._period_s, cells.state_ns[which] / NANOSECONDS)
 
     def _looking_share(self, seat: _Seat, cells: Cells, which: IntArray) -> FloatArray:
-        """Return the share of time that an observer looks out, (cells,); if looking comes in
-        spells, 1 or 0 drawn for the whole run.
-        """
+        """Return the share of time looking out (cells,), or 1 or 0 per run if it is in spells."""
         if self.p.looking == "glances":
             return np.full(len(which), seat.share)
         nobody = np.zeros(len(which), dtype=np.uint64)

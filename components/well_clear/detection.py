@@ -21,9 +21,7 @@ LEAST_BOUND = 1e-3
 
 
 class Bounds(NamedTuple):
-    """Largest deviations of the true relative state from the given one: horizontal position,
-    height, horizontal velocity and climb rate, (n,) each.
-    """
+    """Largest errors (n,) of relative horizontal position, height, velocity and climb rate."""
 
     # Radius of the horizontal position, of the height, of the velocity, of the climb rate
     position_m: FloatArray
@@ -128,8 +126,7 @@ def _most_direct_approach(
     fastest: FloatArray,
     e: Bounds,
 ) -> Horizontal:
-    """Return the relative position and velocity within the bounds that lead the aircraft most
-    directly towards each other.
+    """Return relative position, velocity within bounds that lead aircraft most directly together.
 
     Angles count from the direction towards the intruder, in which the position's cone is centred.
     """

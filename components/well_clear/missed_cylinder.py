@@ -41,8 +41,7 @@ def widen_cylinders(sizes_m: Sequence[tuple[float, float]]) -> list[tuple[float,
 def probability_of_induced_entry(
     size_m: tuple[float, float], missed: Missed, *, climbs: bool
 ) -> FloatArray:
-    """Return an estimate (0 to 1, per run) of how likely a manoeuvre leads into a cylinder that is
-    just missed without it.
+    """Return an estimated probability per run that a manoeuvre leads into a just missed cylinder.
 
     By a turn only where somebody is met at the same altitude: whom it brings nearer to the side
     then, or who is near at the closest approach and met there earlier or later. 0 where nobody is.

@@ -82,8 +82,7 @@ def closest_meetings(
     sizes_m: Sequence[tuple[float, float]],
     missed_m: Sequence[tuple[float, float]],
 ) -> Meetings:
-    """Return each run's closest passing of an intruder; `paths` gives run numbers and paths of
-    pairs.
+    """Return each run's closest passing of an intruder; `paths` are run numbers and pairs' paths.
 
     They are looked at from time 0 to `end_s`; cylinders are (radius, half height), m: as many that
     somebody comes inside of, or that are missed.
@@ -181,9 +180,7 @@ class PairsInPlane:
         return surely, (maybe & ~surely) | self.beyond
 
     def least_distances_by_cylinder_m(self, horizontal_m: float, vertical_m: float) -> FloatArray:
-        """Return (2, pairs), m: the least horizontal distance while within the cylinder's height,
-        and the least vertical distance while within its radius.
-        """
+        """Return (2, pairs), m: least horizontal distance within height, vertical within radius."""
         result = np.full((2, self._count), np.inf)
         up = self._apart[2]
         lowest, highest = np.minimum(up[:-1], up[1:]), np.maximum(up[:-1], up[1:])
@@ -253,8 +250,7 @@ class PairsInPlane:
     def foreseen_conflict_duration_s(
         self, horizontal_m: float, vertical_m: float, until_s: FloatArray
     ) -> FloatArray:
-        """Return for how many seconds before `until_s` each pair, extrapolated straight on, would
-        have entered the cylinder.
+        """Return for how many s before `until_s` straight pairs would have entered the cylinder.
 
         So a conflict is told from `_FORESEEN_S` ahead, where sensors tell of it; one that comes by
         a late turn is foreseen late.
@@ -271,9 +267,7 @@ class PairsInPlane:
         return each_s.cumsum(axis=0)[-1] if len(each_s) else np.full(self._count, np.nan)
 
     def _closest_between_samples(self, step: IntArray, pair: IntArray) -> FloatArray:
-        """Return time, horizontal and vertical distance and range (4, n) of the closest approach
-        between each sample and the next.
-        """
+        """Return closest approaches between samples (4, n): time, horizontal, vertical, range."""
         apart, moved = self._apart[:, step, pair], self._moved[:, step, pair]
         squared = (moved**2).sum(axis=0)
         part = -(apart * moved).sum(axis=0) / np.where(squared > 0.0, squared, 1.0)
@@ -318,9 +312,7 @@ def _enters_cylinder(
 def _fractions_within_radius(
     apart: FloatArray, moved: FloatArray, horizontal_m: float
 ) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return begin and end, as fractions of each straight movement, within which it is inside a
-    radius, and a mask that is False where it never is.
-    """
+    """Return begin, end within a radius as fractions of straight movements; which enter (mask)."""
     north, east = apart[:2]
     a = moved[0] ** 2 + moved[1] ** 2
     b = north * moved[0] + east * moved[1]

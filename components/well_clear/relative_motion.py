@@ -134,8 +134,7 @@ def vertical_span(
     begin_s: float | FloatArray,
     end_s: float | FloatArray,
 ) -> Span:
-    """Return the interval within [begin_s, end_s] in which the height difference, or the time until
-    it is 0, is within its threshold.
+    """Return when in [begin_s, end_s] height difference or time until it is 0 is in its threshold.
 
     Sizes are those of `components.well_clear.volume.Volume`. A level flight is inside all the time
     or never.

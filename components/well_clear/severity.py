@@ -73,9 +73,7 @@ POOR_SCALE_M = np.array([60.0, 60.0, 69.0, 87.0, 101.0, 101.0]) * FOOT_M
 def altimeter_error_mixture(
     altitude_m: Any, mode_c: bool
 ) -> tuple[tuple[FloatArray, FloatArray], ...]:
-    """Return pairs (probability, Laplace scale in m) for each kind of altimeter an aircraft may
-    have: two kinds with Mode C, else one.
-    """
+    """Return (probability, Laplace scale in m) per altimeter kind: two with Mode C, else one."""
     layer = np.searchsorted(LAYER_TOPS_M, np.asarray(altitude_m), side="left")
     if not mode_c:
         return ((np.ones(np.shape(layer)), SCALE_M[layer]),)
@@ -111,8 +109,7 @@ def collision_probability(
     horizontal_m: float = 500 * FOOT_M,
     vertical_m: float = 100 * FOOT_M,
 ) -> FloatArray:
-    """Return the probability of a near mid-air collision at closest approach, given altimeter
-    errors.
+    """Return the near mid-air collision probability at closest approach given altimeter errors.
 
     Parameters
     ----------

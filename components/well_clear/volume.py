@@ -99,9 +99,7 @@ def horizontal_span(motion: Horizontal, volume: Volume, duration_s: float | Floa
 def _entry_time_and_possible_mask(
     motion: Horizontal, volume: Volume, delta: FloatArray, root: FloatArray, still: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Return the time at which pairs outside the radius meet the horizontal condition, and a mask
-    that is True where there can be an entry.
-    """
+    """Return when pairs outside the radius meet the horizontal condition, and which may enter."""
     tau_s = volume.horizontal_time_s
     if volume.time_variable == "modified_tau":
         return _modified_tau_entry(motion, volume, delta), motion.closing_m2_s < 0.0
@@ -114,8 +112,7 @@ def _entry_time_and_possible_mask(
 
 
 def _modified_tau_entry(motion: Horizontal, volume: Volume, delta: FloatArray) -> FloatArray:
-    """Return when, s, modified tau meets its threshold: r²(t) + τ s·v(t) = D²; 0 where that has
-    passed.
+    """Return when, s, modified tau meets its threshold, r²(t) + τ s·v(t) = D²; 0 if it has passed.
 
     Its discriminant is 4Δ(D) + (τ v²)², a sum without cancellation where the flight meets the
     circle. Where the constant term is not positive, the condition holds now.

@@ -198,9 +198,7 @@ def _rung_as_alternative(
 def _parse_vary_option(
     study: Study, text: str, scene: Scene, fixed: Mapping[Key, str]
 ) -> list[Alternative]:
-    """Return one alternative for each value in the text of one ``--vary`` option; raise UsageError
-    if it is invalid or sets a key that the study varies.
-    """
+    """Return one alternative per value of a ``--vary``; UsageError if invalid or varied already."""
     parsed = parse_assignment(text, "--vary")
     if isinstance(parsed, Problem):
         raise SceneError([parsed])

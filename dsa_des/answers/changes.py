@@ -78,9 +78,7 @@ def confidence_per_interval(confidence: float, comparisons: int) -> float:
 def changes_by_model(
     rows: Rows, results: Sequence[Result], confidence: float, method: str, comparisons: int
 ) -> list[PairedChange]:
-    """Return every result's paired change by every model, at each combination of the study's own
-    axis values where both have runs.
-    """
+    """Return each result's paired change by model, per axis combination where both have runs."""
     each = confidence_per_interval(confidence, comparisons)
     owns: dict[tuple[str, tuple[Any, ...]], Estimate] = {}
     changes = []

@@ -29,8 +29,7 @@ _FEWEST, _MOST = 5, 16
 
 
 def split_into_batches(study: Study, many: int | None = None) -> list[Batch]:
-    """Split the runs of a study, whose last axis is the models, into batches of sampled encounters
-    or, where there are more replicas than those, of replicas.
+    """Split runs with models as last axis into batches of sampled encounters or, if more, replicas.
 
     By default each is as large as the study's chunks.
     """

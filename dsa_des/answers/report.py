@@ -81,9 +81,7 @@ class AnswerReport:
     # -- the table ----------------------------------------------------------------------------
 
     def table_rows(self, name: str) -> Iterator[list[str]]:
-        """Yield the rows of one result's table as lists of texts under the headings `HEADS`: first
-        the scene as it is, then each model.
-        """
+        """Yield a result's table rows as texts under `HEADS`: first the scene, then each model."""
         own_ms, spread_ms = self.turn_times.run_cpu_ms_and_spread(0)
         yield [
             AS_IT_IS,
@@ -305,9 +303,7 @@ class AnswerReport:
         return ", ".join(parts)
 
     def notes_on_tables(self) -> list[str]:
-        """Return the lines that are printed below all tables: how sure the intervals are, how CPU
-        time was measured, and which models could not be compared.
-        """
+        """Return the lines below all tables: on intervals, CPU time and models not compared."""
         each = 100 * confidence_per_interval(self.confidence, self.comparisons)
         turns = len({turn for turn, _ in self.turn_times.cpu_s})
         lines = [

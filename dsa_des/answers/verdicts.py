@@ -94,18 +94,14 @@ class ModelVerdict:
 
     @property
     def is_same_or_within_limit(self) -> bool:
-        """Whether its runs are all the same as the scene's own, or its change is surely within the
-        limit.
-        """
+        """Whether its runs all equal the scene's own, or its change is surely within the limit."""
         return self.kind in (SAME, WITHIN)
 
 
 def judge_by_worst_change(
     model: str, result: Result, changes: Sequence[PairedChange], limit: Limit, failed: str
 ) -> ModelVerdict:
-    """Return the verdict on a model by its worst change: beyond, unknown, open, within, same;
-    `failed` is the reason given where there are no changes.
-    """
+    """Return a model's verdict: beyond, unknown, open, within, same; `failed`: why no changes."""
     if not changes:
         return ModelVerdict(
             model, result, NOTHING, None, math.nan, math.nan, failed or "no run of both"

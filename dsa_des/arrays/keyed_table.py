@@ -91,9 +91,7 @@ class KeyedTable:
         return self.take(np.isin(self.replica, runs))
 
     def replace_and_drop_earlier_runs(self, runs: IntArray, newer: Self, first_run: int) -> Self:
-        """Return the table with its rows of `runs` replaced by `newer` and those of runs before
-        `first_run` removed, sorted by run.
-        """
+        """Return the table with `newer` for its `runs`, without runs before `first_run`, sorted."""
         if len(self) == 0 or self._has_surely_only_runs(runs):
             return newer.sort()
         others = (self.replica >= first_run) & ~np.isin(self.replica, runs)

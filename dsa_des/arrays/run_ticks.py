@@ -267,10 +267,12 @@ def _remembered_positions(instants: RunTicks, part: RunTicks) -> IntArray | None
 
 def last_position_at_or_before(instants: RunTicks, asked: RunTicks) -> IntArray:
     """Return the index in `instants` of the last at or before each of `asked` in its run, or -1."""
-    return _last_positions_and_all_known(instants, asked)[0]
+    return _last_positions_and_surely_all_met(instants, asked)[0]
 
 
-def _last_positions_and_all_known(instants: RunTicks, asked: RunTicks) -> tuple[IntArray, bool]:
+def _last_positions_and_surely_all_met(
+    instants: RunTicks, asked: RunTicks
+) -> tuple[IntArray, bool]:
     """Return the index of the latest instant of the same run at or before each asked one (or -1),
     and whether all asked ones are known to be in `instants`.
     """
@@ -303,7 +305,7 @@ def positions_with_found_mask(
     """Return the index in `instants` of the last at or before each asked one in its run (else -1),
     and a mask of those met exactly (None: all).
     """
-    positions, met = _last_positions_and_all_known(instants, asked)
+    positions, met = _last_positions_and_surely_all_met(instants, asked)
     if met or len(instants) == 0:
         return positions, None if met else np.zeros(len(asked), dtype=bool)
     there: BoolArray = (positions >= 0) & (instants.tick[positions] == asked.tick)
@@ -319,8 +321,7 @@ def rank_instants(*parts: RunTicks) -> tuple[list[IntArray], int]:
 
 
 def first_position_at_or_after(instants: RunTicks, asked: RunTicks) -> IntArray:
-    """Return the index in `instants` of the first at or after each of `asked` in its run; without
-    one, the index behind its run.
+    """Return the index of the first at or after each of `asked` in its run, or that behind the run.
 
     Where its run has none so late it is the position behind the run's last one.
     """

@@ -175,15 +175,11 @@ class Component:
         return cls.ladders
 
     def request(self, port: str) -> Any:
-        """Return the request that this block makes to the block that feeds its input `port`, which
-        gets it as `Consumer.request`; None for no request.
-        """
+        """Return what the block feeding input `port` gets as `Consumer.request`; None for none."""
         return None
 
     def offer(self, port: str) -> Any:
-        """Return what this block declares about its output `port` to the blocks that receive it,
-        which get it as `Producer.offer`; None for nothing.
-        """
+        """Return what receivers of output `port` get as `Producer.offer`; None for nothing."""
         return None
 
     def platforms(self) -> Sequence[str]:
@@ -256,8 +252,7 @@ class Component:
         return []
 
     def failure_counts(self) -> Mapping[str, tuple[int, int] | IntArray]:
-        """Return how often work failed for lack of something: what was missing → (failures, cases),
-        or an array (2, runs) of both by run.
+        """Return what work lacked → (failures, cases), or an array (2, runs) of both by run.
 
         Asked after it has run; counts are over every row that it has seen. A block that serves all
         runs gives both of each run, (2, runs) (`dsa_des.record.failure_counts.count_cases`).
@@ -323,8 +318,7 @@ class Component:
     def make_for_all_runs(
         self, parameters: Sequence[Any], make: Callable[[int], "Component"]
     ) -> "Component | None":
-        """Return one component that computes all lock-step runs together, or None if each needs its
-        own, as ``make(run)`` gives it.
+        """Return one component for all lock-step runs, or None if each needs its own ``make(run)``.
 
         Asked of a block that cannot be shared as it is, once it is set up. What it returns gets the
         rows of all runs, which may go side by side, and gives what each instance would. It must

@@ -86,9 +86,7 @@ class Foreign:
 
 @dataclass
 class Imports:
-    """Whether foreign modules may be imported, and a function that is called once with each
-    `Foreign` before it is imported or refused.
-    """
+    """Whether foreign modules may be imported, and a function told of each `Foreign` beforehand."""
 
     allowed: bool = True
     announce: Callable[[Foreign], None] | None = None
@@ -174,8 +172,7 @@ def load_entry_point(point: EntryPoint, key: str = "") -> Any:
 
 
 def load_unnamed_entry_point(point: EntryPoint) -> Any:
-    """Import and return an entry point's object that no scene names, such as a report or command;
-    UsageError if that fails.
+    """Import and return an entry point's object that no scene names; UsageError if that fails.
 
     UsageError if it cannot be imported.
     """
@@ -252,9 +249,7 @@ def _explain_failure(module_name: str, beside: Sequence[Path], error: ForeignFai
 
 
 def _describe_shadowed_folder(module_name: str) -> str:
-    """Return a hint that an installed package was searched instead of the folder of the same name
-    in the working directory; empty where there is none.
-    """
+    """Return a hint that an installed package hides the folder of the same name; else empty."""
     top, *rest = module_name.split(".")
     here = Path.cwd() / top
     found = file_of_module(top)

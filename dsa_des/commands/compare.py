@@ -255,7 +255,9 @@ def _list_farthest_runs(metric: str, pair: ConditionPair, names: tuple[str, str]
 def _print_comparison(
     one: Tables, other: Tables, names: tuple[str, str], only: Sequence[str], stem: Path
 ) -> None:
-    """Print and draw two studies' paired differences at common axis values and runs."""
+    """Print two studies' paired differences (`other` less `one`) at common axis values and runs,
+    and draw the one against the other, a file per metric beside `stem`.
+    """
     if one.rows.axes != other.rows.axes or one.rows.over != other.rows.over:
         raise UsageError(
             f"{names[0]} and {names[1]} have different axes ({one.rows.axes + one.rows.over} and "

@@ -212,7 +212,7 @@ class AnswerOfStudy:
             )
 
         def next_models(done: int) -> list[int]:
-            left = self._remaining_models()
+            left = self._note_failed_and_list_other_models()
             self.turn_times.save(path / _TURNS, len(self._batches))
             report = self.report()
             going_on = done < len(self._batches)
@@ -259,7 +259,7 @@ class AnswerOfStudy:
     def _model_name(self, model: int) -> str:
         return str(self.study.axes[-1].labels[model])
 
-    def _remaining_models(self) -> list[int]:
+    def _note_failed_and_list_other_models(self) -> list[int]:
         """Return indices of models with results in turn one; remember why others failed."""
         assert self._folder is not None
         for table in self._folder.each_part(before_round=1):

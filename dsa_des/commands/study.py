@@ -119,9 +119,7 @@ def require_empty_or_resumed(
 def choose_output_folder(
     home: Path, stem: str, out: str | None, resume: bool
 ) -> "Path | Callable[[], Path]":
-    """Return the folder that ``--out`` names, with `resume` the latest ``stem-NNN`` in `home`, or
-    else a function that makes a new one.
-    """
+    """Return ``--out``, or with `resume` the latest ``stem-NNN``, else a function to make one."""
     if out is not None:
         return user_path(out)
     if resume:

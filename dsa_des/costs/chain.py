@@ -152,9 +152,7 @@ def _chain_row(
 def draw_run_error_against_cost(
     path: Path, title: str, rows: Sequence[dict[str, Any]], label: str
 ) -> None:
-    """Draw each combination of rungs by its CPU time and its run's error (axis text `label`); those
-    on the Pareto front are numbered.
-    """
+    """Draw combinations of rungs by CPU time and run error, those on the Pareto front numbered."""
     best = sorted(
         (row for row in rows if row["pareto"]), key=lambda row: row["cpu_us_per_target_scan"]
     )

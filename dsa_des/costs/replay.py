@@ -204,9 +204,7 @@ def replay_values(ladder: Ladder, run: RungRun, reference: RungRun) -> Values:
 
 
 def error_spread_by_quantity(ladder: Ladder, rung: Values, reference: Values) -> dict[str, Spread]:
-    """Return each quantity's error between two evaluations at the ticks of both: mean, 95th
-    percentile, maximum and number.
-    """
+    """Return each quantity's error at shared ticks: mean, 95th percentile, maximum and number."""
     ticks, values = rung
     other_ticks, others = reference
     _, here, there = np.intersect1d(ticks, other_ticks, return_indices=True)
@@ -220,9 +218,7 @@ def error_spread_by_quantity(ladder: Ladder, rung: Values, reference: Values) ->
 def errors_against_precise(
     ladder: Ladder, run: RungRun, values: Values
 ) -> tuple[dict[str, Spread], str]:
-    """Return the spread of a rung's errors against a far more precise evaluation, and a note on it;
-    without such an evaluation no errors and the reason.
-    """
+    """Return a rung's errors against a far more precise evaluation, and a note; or none and why."""
     if ladder.truth is None:
         return {}, "nothing more exact is known"
     try:

@@ -116,8 +116,7 @@ def convergence_of(
 
 
 def unit_counts_and_settling_start(units: int, over_last: float) -> tuple[list[int], int]:
-    """Return ascending counts of units to estimate from, and the count from which estimates must
-    stay settled.
+    """Return ascending unit counts to estimate from, and that from which they must stay settled.
 
     The way there is spaced evenly in the logarithm, the last stretch evenly.
     """

@@ -87,9 +87,7 @@ def _escape_without_shortening(text: str) -> Markup:
 
 
 def _parameter_rows_by_block(rows: list[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
-    """Return (block, source of most of its values, rows of its parameters) for each block; a row
-    names its own source only if that differs.
-    """
+    """Return (block, main source, parameter rows) for each block; rows name only other sources."""
     by: dict[str, list[Mapping[str, Any]]] = {}
     for row in rows:
         by.setdefault(row["key"].partition(".")[0], []).append(row)

@@ -39,8 +39,7 @@ def sum_failure_counts(parts: Iterable[FailureCounts]) -> dict[str, dict[str, tu
 
 
 def counts_with_cases_added(known: IntArray, lacking: IntArray, every: IntArray) -> IntArray:
-    """Return `known`, counts (2, runs) of failures and cases, plus one per run number in `lacking`
-    (failures) and in `every` (cases).
+    """Return `known` (2, runs) plus a failure per run in `lacking` and a case per run in `every`.
 
     The counts may end before the last run.
     """

@@ -256,9 +256,7 @@ class Recorder:
         del self._groups[mark:]
 
     def flush_if_large(self, run: int, tick: int) -> None:
-        """Write the rows before a tick of a run to the sinks if they are many; no earlier rows may
-        follow.
-        """
+        """Write the rows before a tick of a run if they are many; no earlier rows may follow."""
         if self._noted[0] >= _ROWS_AT_ONCE or self._noted[1] >= _PIECES_AT_ONCE:
             self._noted = [0, 0]
             self._join_recorded_messages()

@@ -23,9 +23,7 @@ def call_or_note(
     *arguments: Any,
     unless: type[Exception] = BrokenPipeError,
 ) -> Any:
-    """Return a function's result; if it raises anything but `unless`, append a text to `notes` and
-    return None.
-    """
+    """Return a function's result; note any error but `unless` in `notes` and return None."""
     try:
         return call(*arguments)
     except unless:
@@ -99,9 +97,7 @@ class _Keeping:
 
 
 def _in_narrowest_integer_type(values: AnyArray) -> AnyArray:
-    """Return whole numbers in the smallest of int8, int16 and int32 that holds them; a column
-    stored as one value for all rows (stride 0) stays unchanged.
-    """
+    """Return whole numbers in the narrowest of int8 to int32; a stride-0 column stays unchanged."""
     if not values.strides[0]:
         return values
     ends = np.array([values.min(), values.max()])

@@ -75,9 +75,7 @@ def replica_scene(scene: Scene, replica: Replica) -> Scene:
 
 
 def _replica_stretch(stretch: Stretch, replica: Replica) -> Stretch:
-    """Return a part of the scene between timed changes with a replica's changes, except to keys
-    that the timed changes set.
-    """
+    """Return a stretch with a replica's changes, except to keys that the timed changes set."""
     fixed = [key_path(key) for key in stretch.keys]
     mine = {
         key: value

@@ -251,9 +251,7 @@ def _is_common_validator(function: Any) -> bool:
 
 
 def _validate_values(model: type[BaseModel], name: str, values: Sequence[Any]) -> list[Any]:
-    """Return the values as the field holds them, after a check of their types; raise `_NoColumn` if
-    the field has more than bounds.
-    """
+    """Return type-checked values as the field holds them; `_NoColumn` if more than bounds apply."""
     field = model.model_fields[name]
     union = get_origin(field.annotation) in (Union, UnionType)
     options = get_args(field.annotation) if union else (field.annotation,)

@@ -270,9 +270,7 @@ class Replicas(Timeline):
         return Grain(set(self.scene.blocks), False, longest_delay_cut_edges(self.scene), {})
 
     def finish(self, components: Mapping[str, Component]) -> Mapping[str, Component]:
-        """Close instances of single replicas and collect their reports; return {}, as no block
-        reports on all runs.
-        """
+        """Close single replicas' instances and collect their reports; return {}."""
         for block in self.split.values():
             block.close_instances(len(self._scenes))
         if self._report is not None:

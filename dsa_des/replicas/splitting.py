@@ -126,9 +126,7 @@ def parent_indices_of_branches(weights: FloatArray, count: int, uniform: float) 
 
 
 def branch_instant_ns(reached_s: float) -> int:
-    """Return the time, ns since the start, from which a branch of a run that reached a level at
-    `reached_s` draws new random numbers.
-    """
+    """Return from when, ns since the start, a branch at `reached_s` draws new random numbers."""
     return math.ceil(reached_s * NANOSECONDS) + _SURELY_NS
 
 

@@ -335,8 +335,7 @@ def draw_numbered_results(
     freedom: float | None,
     limits: Sequence[float] = (),
 ) -> None:
-    """Draw results ``METRIC.NUMBER`` (mean or quantile, with interval) against their number, one
-    line per combination of axis values.
+    """Draw ``METRIC.NUMBER`` with interval against NUMBER, a line per combination of axis values.
 
     With degrees of `freedom` of chi-square: the bounds of the mean over the runs that have a value.
     `limits` are one for all, or one for each number of the series.

@@ -171,8 +171,7 @@ def _clip_share_difference(result: Estimate) -> Estimate:
 
 
 def _bonett_price_difference(changes: FloatArray, confidence: float) -> Estimate:
-    """Return the mean of the paired changes with Bonett and Price's interval: as if one unit more
-    had gained the event and one more had lost it.
+    """Return the mean paired change with Bonett and Price's interval: a gain and a loss are added.
 
     Units of several runs differ by parts of an event: there the two lie the smallest part that is
     seen to either side of the mean.

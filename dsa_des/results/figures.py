@@ -110,9 +110,7 @@ def _shorten_title(title: str) -> str:
 
 
 def _draw_spread(target: Target, tables: Tables, figure: FigureRecord, title: str) -> bool:
-    """Draw a histogram or a cumulative distribution of a result over the runs, one series per value
-    of an axis; return False if it is not a number.
-    """
+    """Draw a result's histogram or cumulative distribution by axis value; False if not a number."""
     rows, metric = tables.rows, str(figure.metric)
     (result,) = (result for result in tables.results if result.name == metric)
     if not result.is_number:

@@ -80,9 +80,7 @@ def texts_rounded_to_interval(half: float, *numbers: float) -> list[str]:
 
 
 def format_with_interval(value: float, half: float) -> str:
-    """Return ``+1.24 ± 0.13`` for a difference and the half-width of its interval; three digits
-    without ± where it has no interval.
-    """
+    """Return a difference as ``+1.24 ± 0.13`` (half-width), or three digits without interval."""
     sign = "+" if value > 0 else ""
     if not 0.0 < half < math.inf:
         return sign + (f"{value:.0f}" if abs(value) >= 100 else f"{value:.3g}")

@@ -73,9 +73,7 @@ def package_versions() -> dict[str, str]:
 
 
 class ErrorRecord(StrictRecord):
-    """Mean, 95th percentile and largest error of a block's model in one quantity, over
-    target-scans; NaN where unknown.
-    """
+    """Mean, 95th percentile, largest error of a model in one quantity over target-scans, or NaN."""
 
     model_config = ConfigDict(allow_inf_nan=True)
 

@@ -225,8 +225,7 @@ def _count_flown_and_gain(
     nominal: FloatArray, mitigated: FloatArray, weight: FloatArray, stands_for: FloatArray | None,
     predicted: FloatArray | None, ratio: float, sampled: float,
 ) -> tuple[int, float]:  # fmt: skip
-    """Return (encounters flown, gain): the gain is how many times as much an interval as wide costs
-    with all encounters flown.
+    """Return (encounters flown, how many times as much an interval as wide costs with all flown).
 
     `sampled` is the sum of the squared residuals of clusters. Encounters are drawn independently,
     so what those of a cluster have in common is as much with all of them flown.
@@ -256,8 +255,7 @@ def share_from_flown_sample(
     predicted: FloatArray | None,
     **options: Any,
 ) -> PairedRatio:
-    """Return the share of `whole` events that are also `part`, by the surer of two estimators from
-    flown encounters, interval cut at 1.
+    """Return which share of `whole` is `part` by the surer of two estimators, interval cut at 1.
 
     The part by all events, as `paired_ratio` has it; or by those that the flown ones stand for (J.
     Hájek's ratio), which is surer where the share is large, and never above 1: the surer of both.
@@ -319,8 +317,7 @@ def _unweighted_numerator_terms(
 def redistribute_lost_runs(
     stands_for: FloatArray, lost: Sequence[float], of: BoolArray
 ) -> FloatArray:
-    """Return `stands_for` with what flown runs without result stood for shared out among the flown
-    runs of the cell (mask `of`).
+    """Return `stands_for` with lost runs' weight shared among the cell's flown runs (mask `of`).
 
     These leave out themselves, as in any study; the others for which they were to stand are shared
     by those flown `of` the same cell. `lost` says for how many each stood, NaN of one of which that

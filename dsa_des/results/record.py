@@ -319,9 +319,7 @@ class StudyRecord(StudyHead):
     def swaps_and_sets(
         self, row: Mapping[str, Any]
     ) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-        """Return (swaps, set values), both lists of (name, value), that turn the base scene into a
-        row's.
-        """
+        """Return (swaps, sets), lists of (name, value), that turn the base scene into a row's."""
         swaps, sets = list(self.swaps), list(self.sets)
         indices = np.unravel_index(int(row["cell"]), [len(axis.values) for axis in self.axes])
         for axis, index in zip(self.axes, indices, strict=True):

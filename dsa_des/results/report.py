@@ -169,9 +169,7 @@ def _preformatted_lines(lines: Iterable[str]) -> Markup:
 
 
 def _summary_cells(line: Line, exact: bool = False) -> tuple[Any, ...]:
-    """Return a table row of a summary line: label and values rounded to the interval, or with
-    `exact` the name and five digits.
-    """
+    """Return label and values rounded to the interval, or if `exact`, name and five digits."""
     e = line.estimate
     said = (readable_label(line.result.name), *rounded_value_and_interval(e))
     if exact:

@@ -67,8 +67,7 @@ _RESAMPLES = 2000
 
 
 class StoredRows:
-    """The rows with a result in a study's folder, sorted by cell and replica, and how many of the
-    other runs failed and how.
+    """The rows with a result, sorted by cell and replica, and how many other runs failed and how.
 
     With `before_round` only those of earlier rounds.
     """
@@ -104,9 +103,7 @@ class StoredRows:
         return self._held[name]
 
     def _read_columns(self, names: Sequence[str], *, look: bool) -> None:
-        """Read and keep named columns of all parts; with `look`, also count the statuses of all
-        runs and keep the first failed ones.
-        """
+        """Read and keep named columns; with `look`, also count statuses and keep first failures."""
         while self._held and len(self._held) + len(names) > self._at_once:
             self._held.popitem(last=False)
         columns = None if look else [*names, "error"]
@@ -169,9 +166,7 @@ def _concatenate(pieces: list[Any]) -> AnyArray:
 
 
 class Rows:
-    """A study's rows as columns, grouped into places (combinations of axis values) and units
-    (replicas, or encounters, that are independent of each other).
-    """
+    """A study's rows as columns, in places (axis values) and units (replicas or encounters)."""
 
     def __init__(self, stored: StoredRows, axes: Sequence[str], over: Sequence[str]) -> None:
         self.stored = stored
@@ -196,9 +191,7 @@ class Rows:
 
     @cached_property
     def represented_run_counts(self) -> FloatArray | None:
-        """Weight of each row: how many runs it stands for where only a sample is flown, 0 if not
-        flown; None if all are.
-        """
+        """Runs each row stands for in a flown sample, 0 if not flown; None if all are flown."""
         if STANDS_FOR not in self.stored.names:
             return None
         result = self.column(STANDS_FOR)
@@ -232,9 +225,7 @@ class Rows:
         return codes
 
     def row_indices_by_axis_values(self) -> Iterator[tuple[tuple[Any, ...], IntArray]]:
-        """Yield (axis values, indices of the rows with them), combinations in order of first
-        row.
-        """
+        """Yield (axis values, indices of their rows), combinations in order of first row."""
         order = np.argsort(self.places, kind="stable")
         _, starts = np.unique(self.places[order], return_index=True)
         groups = np.split(order, starts[1:]) if len(order) else []
@@ -274,7 +265,7 @@ class Rows:
             ratio, missing = self.ratio(result, rows, confidence, method)
             return ratio_as_estimate(ratio), missing
         if self.is_missing_unless_flown(result.name):
-            return self._estimate_sampled_share(result, rows, confidence)
+            return self._sampled_share_and_missing_count(result, rows, confidence)
         values = self.column(result.name)[rows].astype(float)
         missing = int(np.isnan(values).sum())
         if result.kind not in (EVENT, SHARE):
@@ -296,12 +287,10 @@ class Rows:
         tried = np.bincount(index, weights=trials, minlength=len(units))
         return estimate_share(won.astype(float), tried.astype(float), confidence), missing
 
-    def _estimate_sampled_share(
+    def _sampled_share_and_missing_count(
         self, result: Result, rows: IntArray, confidence: float
     ) -> tuple[Estimate, int]:
-        """Return (share of runs with an event, rows without a value) where only a sample was
-        flown.
-        """
+        """Return (share of runs with an event, rows without a value) from a flown sample."""
         assert self.represented_run_counts is not None
         values, stands_for = (
             self.column(result.name)[rows].astype(float),
@@ -340,9 +329,7 @@ class Rows:
         return ratio, missing
 
     def _ratio_terms(self, result: Result, rows: IntArray) -> tuple[RatioTerms, IntArray, int]:
-        """Return (columns of a ratio in rows that have all of them, those rows, number of
-        others).
-        """
+        """Return (a ratio's columns in the rows with all, those rows, the number of others)."""
         of = result.ratio
         assert of is not None
         if of.only is not None:

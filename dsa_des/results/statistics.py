@@ -112,9 +112,7 @@ def estimate_share(successes: FloatArray, trials: FloatArray, confidence: float)
 
 
 def _has_few_units(successes: FloatArray, trials: FloatArray) -> bool:
-    """Return whether there are too few units for an interval: in all, with a success, or with a
-    failure.
-    """
+    """Return whether there are too few units, successes or failures for an interval."""
     unlike = min(np.count_nonzero(successes < trials), np.count_nonzero(successes > 0))
     return bool(len(trials) < FEW or unlike < FEW_UNLIKE)
 
@@ -289,8 +287,7 @@ def unseen_event_mean_and_square(terms: FloatArray) -> tuple[float, float]:
 
 
 def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed: int) -> FloatArray:
-    """Return sum(above) / sum(below) of bootstrap resamples of units, without those where
-    sum(below) is 0.
+    """Return bootstrapped sum(above) / sum(below) over units, without those where sum(below) is 0.
 
     Units without any event are drawn together: they add nothing to either sum. Those that are
     alike in both sums are too, which leaves few kinds where weights repeat.
@@ -316,8 +313,7 @@ def resampled_ratios(below: FloatArray, above: FloatArray, resamples: int, seed:
 def gamma_interval_of_ratio(
     below: FloatArray, above: FloatArray, ratio: float, tail: float
 ) -> tuple[float, float]:
-    """Return (low, high) of the interval of sum(above) / sum(below); each end errs with probability
-    `tail` at most.
+    """Return (low, high) of sum(above) / sum(below); each end errs with probability `tail` at most.
 
     `below` and `above` are the clusters' terms below and above the line.
 
@@ -386,9 +382,7 @@ def _probability_gamma_exceeds(one: tuple[float, float], other: tuple[float, flo
 def _ratio_at_certainty(
     certainty: Callable[[float], float], sure: float, start: float, factor: float
 ) -> float:
-    """Return the ratio at which `certainty` reaches `sure`, sought from `start` in steps of
-    `factor`; 0 or infinity if it never does.
-    """
+    """Return where `certainty` reaches `sure`, from `start` in steps of `factor`; else 0 or inf."""
     inner = outer = start
     while certainty(outer) < sure:
         if not 1e-300 < outer < 1e300:

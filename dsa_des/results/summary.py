@@ -191,9 +191,7 @@ def one_sided_confidence(confidence: float) -> float:
 
 
 def numbers_by_series_result(metric: str, names: Iterable[str]) -> dict[str, float]:
-    """Return result name → its number, ascending, for the results ``METRIC.5``, ``METRIC.10``
-    ...
-    """
+    """Return result name → its number, ascending, for ``METRIC.5``, ``METRIC.10`` ..."""
     numbers = {}
     for name in names:
         number = name.removeprefix(f"{metric}.")

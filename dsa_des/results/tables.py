@@ -75,9 +75,7 @@ class Tables:
         return expected
 
     def shown_lines(self, only: Sequence[str] = ()) -> list[Line]:
-        """Return summary lines of the named results; by default of those in figures and the stop
-        rule, or all if there are none.
-        """
+        """Return the named results' lines; by default those in figures and stop rule, or all."""
         wanted = set(only) or {f.metric for f in self.record.figures if f.metric is not None}
         if self.record.stop_when is not None and not only:
             wanted.add(self.record.stop_when.metric)
@@ -91,7 +89,9 @@ class Tables:
         ]
 
     def write(self) -> None:
-        """Write the summary and the differences."""
+        """Write the summary to the study's folder, and the differences, ratios and answers to
+        requirements where there are any.
+        """
         self.folder.write_table(SUMMARY, _parquet(self._summary_columns()))
         if self.compared:
             self.folder.write_table(DIFFERENCES, _parquet(self._difference_columns()))
@@ -197,9 +197,7 @@ class Tables:
 
 
 def cut_off_text(line: Line) -> str:
-    """Return where the run cut a result off and how often: ``12 of 200 at the start, 3 never``;
-    empty if nowhere.
-    """
+    """Return where a result was cut off: ``12 of 200 at the start, 3 never``; empty if nowhere."""
     texts = [f"{many:,} {shorten(where)}" for where, many in line.cut_off]
     texts[:1] = [text.replace(" ", f" of {line.runs:,} ", 1) for text in texts[:1]]
     return ", ".join(texts)

@@ -82,8 +82,7 @@ class Channel:
         return min(self._pushed) if self._pushed else None
 
     def push(self, message: Message, sent: int | IntArray | None = None) -> RunTicks:
-        """Add a message; return (run, tick) at which its rows will arrive, in order, without lost
-        rows.
+        """Add a message; return (run, tick) at which rows not lost will arrive, in order.
 
         `sent` is the tick at which it was sent, or each of its rows, when that is later than their
         own.
@@ -143,9 +142,7 @@ class Channel:
         return min((int(arrivals.tick.min()) for arrivals, _ in self._waiting), default=MAX_TICK)
 
     def _count_or_mask_before(self, arrivals: RunTicks, end: int) -> int | BoolArray:
-        """Return which rows arrive before `end`: their number if they come first, else a mask, True
-        for them.
-        """
+        """Return which rows arrive before `end`: their number if they come first, else a mask."""
         if len(self._runs.going) == 1:
             return arrivals.count_before_end(end)
         if end >= self._runs.run_ticks:
@@ -192,8 +189,7 @@ class Channel:
         return collected if len(collected[0]) else None
 
     def held_rows_at_instants(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return (message, index of its row that the input holds at each instant); the instants are
-        in order and before `end`.
+        """Return (message, index of its row held at each instant); instants in order before `end`.
 
         With the message comes the row of it that is held at each instant, -1 when none has arrived.
         None: it holds nothing at all.
@@ -217,9 +213,7 @@ class Channel:
         return held[1], last_position_at_or_before(held[0], asked)
 
     def _keep_as_held(self, new: Rows, end: int) -> None:
-        """Keep collected rows as held; drop older ones where each run being simulated has a new
-        one.
-        """
+        """Keep collected rows as held; drop older ones where all simulated runs have new ones."""
         if self._runs.count == 1:
             self._passed = [new]
             return
@@ -294,9 +288,7 @@ class WireEnd(Protocol):
     source: str
 
     def held_rows_at_instants(self, asked: RunTicks, end: int) -> tuple[Message, IntArray] | None:
-        """Return (message, index of its row that the input holds at each instant, -1 for none);
-        None if it holds nothing.
-        """
+        """Return (message, its row index held at each instant or -1); None if nothing is held."""
 
     def pop_arrived_rows(self, end: int) -> Rows | None:
         """Remove and return the rows that arrive before `end`; None if there are none."""

@@ -114,9 +114,7 @@ def remaining_tolerance(
 def _omission_reasons_by_effect(
     verdicts: Sequence[tuple[Effect, Verdict]], tolerance: Mapping[str, float]
 ) -> dict[str, str]:
-    """Return effect name → reason, for effects left out as their error bounds together stay within
-    the tolerance.
-    """
+    """Return effect name → reason, for those left out as joint error bounds are tolerated."""
     left = dict(tolerance)
     allowed: dict[str, str] = {}
     bounded = [

@@ -72,9 +72,7 @@ class RunState(Protocol):
 
 
 class OwnProcess(Protocol):
-    """What a `BlockEnvironment` needs of the node that runs its block: priority, arrivals, inputs
-    and sending.
-    """
+    """What a `BlockEnvironment` needs of its block's node: priority, arrivals, inputs, sending."""
 
     simulation: RunState
 

@@ -43,9 +43,7 @@ def _blocks_without_windows(scene: Scene) -> dict[str, str]:
 
 
 def _explain_fast_feedback(scene: Scene, opened: Collection[Edge]) -> dict[str, str]:
-    """Return block → reason, for blocks in loops whose feedback arrives sooner than the next
-    scan.
-    """
+    """Return block → reason, for blocks in loops whose feedback comes before the next scan."""
     stuck = sorted(name for name, cls in scene.classes.items() if not cls.rewindable)
     clocks = [block.cls.clock_of(block.parameters) for block in scene.blocks.values()]
     per_s = sum((clock.rate_hz for clock in clocks if clock is not None), Fraction(0))
@@ -172,9 +170,7 @@ def blocks_held_back_from_windows(scene: Scene, windowed: Collection[str]) -> li
 
 
 def _blocks_that_prevent_windows(scene: Scene, windowed: Collection[str]) -> dict[str, str]:
-    """Return block → reason, for blocks that run scan by scan and force those fed by them to do
-    so.
-    """
+    """Return block → reason, for blocks that run scan by scan and make those they feed do so."""
     kept = set(blocks_held_back_from_windows(scene, windowed))
     return {
         name: why

@@ -78,9 +78,7 @@ def shortest_delay_s(scene: Scene, edge: Edge) -> Fraction:
 
 
 def _scan_period_s(scene: Scene, edge: Edge) -> Fraction:
-    """Return the scan period, s, in which an edge's delay counts: the receiver's, else the
-    sender's, else 0.
-    """
+    """Return the scan period, s, in which a delay counts: the receiver's, the sender's or 0."""
     for name in reversed(edge):
         block = scene.blocks[name]
         spec = block.cls.clock_of(block.parameters)

@@ -138,9 +138,7 @@ class Node:
             self.simulation.fail(self, ticks, error)
 
     def failure_counts(self) -> Mapping[str, IntArray]:
-        """Return kind of failure → (failures, cases) by run, (2, runs): that it never ran, or
-        outages.
-        """
+        """Return kind of failure → (failures, cases), (2, runs): that it never ran, or outages."""
         out = {} if self.outages is None else self.outages.failure_counts()
         if self.component.process is not None or self._all_ran:
             return out
@@ -217,9 +215,7 @@ class Node:
         return max(start, min(ticks, default=MAX_TICK))
 
     def _window_end(self, window: Window) -> int:
-        """Return the tick that ends the block's window; later than the window's end for blocks that
-        run ahead of all loops.
-        """
+        """Return the tick that ends a block's window, later for blocks that run ahead of loops."""
         return window.ahead if self.ahead else window.end
 
     def _demanded_instants(self, start: int, end: int) -> RunTicks:

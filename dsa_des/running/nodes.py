@@ -149,9 +149,7 @@ def demands_of_clocks_downstream(nodes: Mapping[str, Node], name: str) -> list[D
 
 
 def _carries_demanded_rows(nodes: Mapping[str, Node], wire: Wire) -> bool:
-    """Return whether a wire carries rows of an on-demand block that a scan clock downstream
-    needs.
-    """
+    """Return whether a wire carries an on-demand block's rows that a downstream scan needs."""
     target, todo, seen = nodes[wire.target], [wire.source], {wire.source}
     if target.clock is None and not demands_of_clocks_downstream(nodes, wire.target):
         return False

@@ -316,9 +316,7 @@ class Processor:
     def _end_ticks_of_served_jobs(
         self, tick: IntArray, service: IntArray, blocks: np.ndarray, end: int
     ) -> IntArray:
-        """Serve jobs in order of entry, return the ticks at which they end, and record those before
-        `end`.
-        """
+        """Serve jobs in order of entry, return their end ticks, and record those before `end`."""
         worked = np.cumsum(service)
         idle = np.maximum(tick, self._free_from) - (worked - service)
         ends: IntArray = np.maximum.accumulate(idle) + worked

@@ -258,9 +258,7 @@ class Simulation:
                 )
 
     def _check_ready(self) -> None:
-        """Raise an error if a block still waits for a host program, or the simulation has run
-        already.
-        """
+        """Raise if a block still waits for a host program, or the simulation has already run."""
         hosted = [
             self.scene.problem(f"blocks.{name}.type", component.needs_host)
             for name, component in self.components.items()
@@ -320,9 +318,7 @@ class Simulation:
     def fail(
         self, node: RunningBlock, ticks: IntArray, error: BaseException, scan: int = -1
     ) -> None:
-        """Record a block's error at `ticks`, and leave SimPy unless this window may still be
-        undone.
-        """
+        """Record a block's error at `ticks`; leave SimPy unless this window may be undone."""
         if self.failure is None:  # a provisional window goes on; the first failure counts
             time_s, number = int(ticks[0]) / self.ticks_per_s, scan if scan >= 0 else None
             said = block_failure(node.component, time_s, error, number)

@@ -32,9 +32,7 @@ def _zero_jitter_draw(number: int) -> Callable[[IntArray], FloatArray]:
 
 
 class Timeline:
-    """Clocks, channels, outages and windows of a run; with `everything`, clocks draw jitter even
-    where it is 0.
-    """
+    """A run's clocks, channels, outages, windows; with `everything`, jitter is drawn even if 0."""
 
     count = 1
     says_replica = False
@@ -139,9 +137,7 @@ class Timeline:
         return Outages(failing, self.streams, self.runs, self.scene.ticks_per_s)
 
     def block_switching_by_stretch(self, instances: Sequence[Component]) -> StretchedBlock | None:
-        """Return the object that hands wakes to the instance of their stretch; None if one serves
-        all.
-        """
+        """Return what hands wakes to the instance of their stretch; None if one serves all."""
         if all(one is instances[0] for one in instances):
             return None
         return StretchedBlock(self.stretch_start_ticks, instances)
@@ -151,9 +147,7 @@ class Timeline:
         return choose_grain(self.scene, window)
 
     def runner(self, component: Component) -> Any:
-        """Return the object that handles a block's wakes: the component itself, or one in its
-        place.
-        """
+        """Return what handles a block's wakes: its component, or an object in its place."""
         return component
 
     def windows(

@@ -61,8 +61,7 @@ class Demand:
     lead_ticks: int
 
     def instants_between(self, start: int, end: int) -> RunTicks:
-        """Return the instants in [start, end) when the upstream block must send for this one's
-        scans.
+        """Return instants in [start, end) when the upstream block must send for this one's scans.
 
         None of these rows would arrive after the end of the run, where the clock has no scan.
         """
@@ -93,8 +92,7 @@ class RunningBlock(Protocol):
 
 
 class Windows:
-    """Cuts runs into windows no longer than the horizon, a group of runs up to their end, then the
-    next group.
+    """Cuts runs into windows no longer than the horizon, group by group of runs to their end.
 
     Nothing that is sent in a window comes back in it. The horizon is the lookahead of conservative
     parallel simulation (Chandy and Misra, "Distributed simulation: a case study in design and

@@ -75,8 +75,7 @@ class ProcessorParameters(Parameters):
 
 @dataclass(frozen=True)
 class Block:
-    """One block of a scene: its name, its type as written, its class, its own parameters, and
-    what its table says to the engine."""
+    """A scene's block: name, type as written, class, own parameters, what it tells the engine."""
 
     name: str
     type_name: str

@@ -37,8 +37,7 @@ _KEYS = (*_INSTANTS, "set")
 
 @dataclass(frozen=True)
 class TimedChange:
-    """Values that some keys of a scene take from an instant on, to the end of the run or to a later
-    instant.
+    """Values that some keys take from an instant to the end of the run or to a later instant.
 
     Parameters
     ----------
@@ -162,9 +161,7 @@ def _read_entry(
 
 
 def _renumber_wire_key(scene_file: SceneFile, text: str, key: Key, wires: Sequence[Wire]) -> str:
-    """Return a dotted key with the number of a wire as written replaced by its number among the
-    scene's separate, sorted wires.
-    """
+    """Return a dotted key with a written wire number replaced by that among the sorted wires."""
     if key[0] != "wires":
         return text
     entry = scene_file.data["wires"][key[1]]

@@ -110,9 +110,7 @@ class Inheritance:
     def note_sibling_values(
         self, own: Mapping[str, Any], merged: Mapping[str, Any], at: Key
     ) -> None:
-        """Record the plain values beside each table inside a block, as of the file that first
-        writes it.
-        """
+        """Record plain values beside each table in a block, from the file that first writes it."""
         for key, value in own.items():
             inherited = merged.get(key)
             if not (isinstance(value, dict) and isinstance(inherited, dict)):

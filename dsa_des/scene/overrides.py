@@ -84,9 +84,7 @@ def read_sets(assignments: Iterable[str]) -> tuple[list[tuple[str, Any]], list[P
 def read_changes(
     sets: Iterable[str], swaps: Iterable[str], seed: int | None, duration_s: object
 ) -> tuple[list[Change], list[Problem]]:
-    """Return the changes that ``--swap``, ``--set``, ``--seed`` and ``--duration`` make, in this
-    order, and what is wrong with them.
-    """
+    """Return changes by ``--swap``, ``--set``, ``--seed``, ``--duration`` in turn, and problems."""
     changes: list[Change] = []
     problems: list[Problem] = []
     for swap in swaps:

@@ -61,9 +61,7 @@ def platform_by_block(scene: Scene, moved: Mapping[str, Sequence[str]]) -> dict[
 
 
 def _feeding_blocks(scene: Scene, name: str, *, between: bool) -> list[str]:
-    """Return the blocks that feed inputs of `name` that reach between platforms, or with `between`
-    False its other inputs.
-    """
+    """Return feeders of `name`'s inputs between platforms, or of the others if not `between`."""
     inputs = scene.blocks[name].cls.inputs
     return [
         wire.source
@@ -90,9 +88,7 @@ def _first_block_by_platform(sources: Sequence[str], carrying: Mapping[str, str]
 
 
 def _explain_no_platform(scene: Scene, name: str, known: Sequence[str] | None) -> Problem:
-    """Return the problem with the platform that a block's table names; `known` is None if the block
-    itself moves the platforms.
-    """
+    """Return what is wrong with a block's platform; `known` is None if it moves the platforms."""
     said = scene.blocks[name].options.platform or ""
     if known is None:
         why = "it moves all platforms and is on none: name it at the blocks that look from it"

@@ -243,9 +243,7 @@ def merge_tables_in_place(base: dict[str, Any], over: Mapping[str, Any]) -> dict
 
 
 def _similar_file_hint(path: Path, shipped: bool) -> str:
-    """Return a hint at a similar file, beside `path` or shipped, or at a missing folder; else
-    empty.
-    """
+    """Return a hint at a similar file (beside `path`, shipped) or a missing folder; else empty."""
     from dsa_des.errors import nearest_name
 
     missing, names = "", []

@@ -273,9 +273,7 @@ def _report_double_writers(
 
 
 def add_block_latencies(wires: list[Wire], options: Mapping[str, BlockOptions]) -> list[Wire]:
-    """Return the wires with their senders' latency added, and a mark on those whose messages pass a
-    shared processor.
-    """
+    """Return the wires with senders' latency added, and those through shared processors marked."""
     return [
         replace(
             wire,

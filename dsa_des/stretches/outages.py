@@ -81,9 +81,7 @@ class Outages:
         return self._freeze_rows(port, message) if self._freezes else message
 
     def _freeze_rows(self, port: str, message: Message) -> Message:
-        """Return the message with frozen rows replaced by their run's last good row; remember the
-        last good rows.
-        """
+        """Return the message with frozen rows as their run's last good row; remember those rows."""
         before = [self._last[port]] if port in self._last else []
         known = sum(map(len, before))
         both = message.concatenate([*before, message])

@@ -15,8 +15,7 @@ from dsa_des.block.wake import Arrivals, Wake
 
 
 class StretchedBlock:
-    """A block with an instance for each stretch of time between timed changes; neighbouring
-    stretches may share one.
+    """A block with an instance for each stretch between timed changes; neighbours may share one.
 
     `from_ticks` are the first ticks of the stretches, ascending, the first one 0.
     """

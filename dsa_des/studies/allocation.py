@@ -95,9 +95,7 @@ class Allocation:
         return flight_probabilities(runs.weight * worth, self.size, self.least)
 
     def predicted_event_chances(self, runs: ForeseenRuns) -> FloatArray:
-        """Return the predicted chance of each event in each run, (events, runs), 0 for events that
-        are not predicted.
-        """
+        """Return each event's predicted chance in each run, (events, runs), 0 if not predicted."""
         return np.where(self.predicted[:, np.newaxis], self._chances(runs), 0.0)
 
     def _chances(self, runs: ForeseenRuns) -> FloatArray:
@@ -118,9 +116,7 @@ def flight_probabilities(worth: FloatArray, size: float, least: float) -> FloatA
 
 
 def sampling_variance(chance: FloatArray, predicted: BoolArray) -> FloatArray:
-    """Return the part of each event's variance that depends on how often its run is flown, (events,
-    runs).
-    """
+    """Return each event's part of variance due to how often its run is flown, (events, runs)."""
     sure = np.clip(chance, None, _SUREST)
     return np.where(predicted[:, np.newaxis], sure * (1.0 - sure), chance)
 
@@ -221,8 +217,7 @@ def best_probability_scale(
 def fit_logistic_coefficients(
     terms: FloatArray, expected: FloatArray, happened: FloatArray, weight: FloatArray
 ) -> FloatArray:
-    """Return the most probable coefficients (level, weight of the expected chances, slopes) of an
-    event's logistic model.
+    """Return likeliest logistic coefficients of an event (level, weight of chances, slopes).
 
     Newton's method on the logarithm of the likelihood and of a normal distribution of the
     coefficients (level, belief, slopes); with no event at all it stays near what was expected. A
@@ -277,9 +272,7 @@ def _logistic(score: FloatArray) -> FloatArray:
 
 
 def round_ends(replicas: int, batch: int | None) -> list[int]:
-    """Return the replica before which each round ends: rounds of `batch` replicas, or without one
-    growing rounds.
-    """
+    """Return the replica before which each round ends: rounds of `batch`, or else growing ones."""
     if batch is not None:
         return [min(end, replicas) for end in range(batch, replicas + batch, batch)]
     ends, end = [], PILOT

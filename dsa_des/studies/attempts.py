@@ -32,9 +32,7 @@ TRIES = 3
 
 @dataclass(frozen=True)
 class Piece:
-    """Chunks, or some runs of one chunk, to run in one process, and how often a process died on
-    them.
-    """
+    """Chunks, or some runs of one, to run in one process, and how often a process died on them."""
 
     chunks: tuple[Chunk, ...]
     losses: int = 0
@@ -121,9 +119,7 @@ class Attempts:
 def group_chunks(
     study: Study, chunks: Sequence[Chunk], workers: int
 ) -> Iterator[tuple[Chunk, ...]]:
-    """Yield groups of a cell's consecutive chunks to simulate at once, with equal work per
-    worker.
-    """
+    """Yield groups of a cell's consecutive chunks to run at once, with equal work per worker."""
     if len(chunks) < 2:
         yield from ((chunk,) for chunk in chunks)
         return

@@ -99,9 +99,7 @@ def run_chunks(study: Study, chunks: Sequence[Chunk]) -> list[ChunkResult]:
 
 @contextmanager
 def _delay_garbage_collection() -> Iterator[None]:
-    """Inside the block, make garbage collection rare, as the objects of runs simulated together
-    live to its end.
-    """
+    """Make garbage collection rare inside the block, as objects of joint runs live to its end."""
     usual = gc.get_threshold()
     gc.set_threshold(max(usual[0], _OBJECTS_AT_ONCE) if usual[0] else 0, *usual[1:])
     try:

@@ -73,9 +73,7 @@ def allocation_refusal(study: Study, scene: Scene) -> str:
 
 
 def ratios_to_optimise(results: Sequence[Result], allocate: Sequence[str]) -> list[Result]:
-    """Return the ratio results that `allocate` names; with ``auto`` all that cover every class of
-    runs.
-    """
+    """Return the ratios that `allocate` names; with ``auto`` all that cover every class of runs."""
     ratios = [result for result in results if result.ratio is not None]
     if AUTO in allocate:
         return [one for one in ratios if one.ratio is not None and one.ratio.only is None]
@@ -123,8 +121,7 @@ def sample_weights_and_predictions(
     results: Sequence[Result],
     columns: Mapping[str, AnyArray],
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Draw the runs to fly; return how many runs each one stands for, (runs,), 0 if not flown, and
-    column → predicted events.
+    """Draw runs to fly; return runs each stands for, (runs,), or 0, and column → predicted events.
 
     Whether a run is flown depends on its seed and on what is known of it, and on no other run.
     """
@@ -164,9 +161,7 @@ def _foreseen_runs(columns: Mapping[str, Any], ratios: Sequence[RatioOf]) -> For
 
 
 def _event_flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArray) -> FloatArray:
-    """Return an event's flags as 0 or 1; 0 where missing, or where a run is outside the ratio's
-    class.
-    """
+    """Return an event's flags as 0 or 1; 0 where missing or outside the ratio's class."""
     result: FloatArray = np.nan_to_num(flags.astype(np.float64))
     return result if of.only is None else result * (columns[of.only[0]] == of.only[1])
 
@@ -174,9 +169,7 @@ def _event_flags_in_class(columns: Mapping[str, Any], of: RatioOf, flags: AnyArr
 def allocations_of_round(
     study: Study, folder: StudyFolder, number: int, first: int, cells: Sequence[int]
 ) -> dict[int, Allocation]:
-    """Return cell → plan for the round from replica `first`, learnt from the rounds before
-    `number`.
-    """
+    """Return cell → plan for the round from replica `first`, learnt from rounds before `number`."""
     if not study.allocate:
         return {}
     ratios = [

@@ -181,8 +181,7 @@ def _join_texts(pieces: Sequence[Text]) -> Text:
 
 
 class Metric:
-    """Base class of what is measured of every run of a study. Subclass it and register the
-    subclass.
+    """Base class of what is measured of every run of a study; subclass and register it.
 
     Parameters
     ----------

@@ -60,9 +60,7 @@ def run_study(
     executor: Executor,
     report: Callable[[Progress], None] = lambda progress: None,
 ) -> Progress:
-    """Run all runs that a study's open folder lacks, call `report` after each chunk, and return the
-    counts.
-    """
+    """Run all runs that a study's folder lacks, call `report` after each chunk, return counts."""
     progress = Progress(total=len(study.cells) * study.replicas)
     cells = list(study.cells)
     starts = [0, *study.round_ends[:-1]]

@@ -142,9 +142,7 @@ class Study:
 
     @property
     def runs_started_per_cell(self) -> int:
-        """Runs started per cell: its replicas, each times the runs of one stage if there is
-        splitting.
-        """
+        """Runs started per cell: replicas, times the runs of one stage if there is splitting."""
         return self.replicas * (1 if self.splitting is None else self.splitting.runs)
 
     @property
@@ -180,9 +178,7 @@ class Study:
         return changed_scene(self.base, *self.swaps_and_sets(cell), str(self.path))
 
     def member_seed(self, cell: int) -> int:
-        """Return the seed of a cell's runs: from its values of sampled axes; the study's without
-        such axes.
-        """
+        """Return the seed of a cell's runs, by its values of sampled axes; else the study's."""
         if not self.over:
             return self.seed
         members = zip(self.axes, self.axis_value_indices(cell), strict=True)

@@ -80,9 +80,7 @@ def check_axes_draws_and_run(study: Study, file: SceneFile, scene: Scene) -> Non
 
 
 def _check_last_of_sequences(study: Study, scenes: list[Scene], file: SceneFile) -> None:
-    """Set up a run with each sequence draw's last value, and report failures, as where a file is
-    too short for it.
-    """
+    """Set up a run with each sequence draw's last value; report failures, as a file too short."""
     last = study.runs_started_per_cell - 1
     for draw in study.draws:
         if draw.kind != "sequence" or not last:

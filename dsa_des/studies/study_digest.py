@@ -162,9 +162,7 @@ def sampled_geometry_names(study: Study) -> list[str]:
 
 
 def result_columns_of_study(study: Study) -> list[Result]:
-    """Return the result columns of a study's metrics, each with the plot colour and marker of its
-    block if the block's class has them.
-    """
+    """Return metrics' result columns, with the plot colour and marker of their block, if any."""
     scene = study.scene(0)
     results = [result for spec in study.metrics for result in spec.build(scene).results()]
     marks = plot_mark_by_name({name: block.cls for name, block in scene.blocks.items()})

@@ -83,9 +83,7 @@ def defer_signals() -> Iterator[None]:
 
 @contextmanager
 def _install_handler(handler: Any, replaces: Any) -> Iterator[None]:
-    """Inside the block, handle signals that end the program by `handler`, each where `replaces` is
-    true of its old handler.
-    """
+    """Inside the block, handle ending signals by `handler` where `replaces` is true of the old."""
     before: dict[int, Any] = {}
     try:
         # Python hands signals to the main thread only, and lets no other one set handlers.

@@ -108,9 +108,7 @@ class GaussMarkov:
     def _values_after_branches(
         self, branches: int, who: Any, instants: IntArray, first: int, runs: IntArray
     ) -> FloatArray:
-        """Return the process values of runs after their first `branches` branches, from each of
-        which on other draws apply.
-        """
+        """Return the process values after runs' first `branches` branches, each with new draws."""
         if not branches:
             return self._values_from_stream(self._stream.of_runs(runs), who, instants, first)
         begin = self._stream.branch_start_and_stream(runs, branches)[0]

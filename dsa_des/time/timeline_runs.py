@@ -42,9 +42,7 @@ class Runs:
         self.ended_by: dict[int, str] = {}
 
     def rows_complete_before(self, tick: int, going: range) -> tuple[int, int]:
-        """Return (run, tick) before which no further row can come, once the runs `going` reached
-        `tick`.
-        """
+        """Return (run, tick) before which no row can come, once the runs `going` reached `tick`."""
         if tick >= self.run_ticks:
             return going.stop, 0
         return going.start, tick if len(going) == 1 else 0

@@ -13,8 +13,8 @@ from wired import chain
 import dsa_des
 from components.flights.bounds import (
     _latitude_and_altitude_bounds,
-    check_above_raster_ground,
     check_above_terrain,
+    check_over_raster_above_ground,
 )
 from components.terrain.raster import ElevationRaster, mosaic, read_raster
 from components.terrain.rays import (
@@ -358,11 +358,11 @@ def test_a_flight_is_held_against_the_ground_where_it_is_there():
         assert times.tolist() == seconds.tolist()
         return state
 
-    check_above_raster_ground(at, ground(0.6), 399.0, 5.0)
+    check_over_raster_above_ground(at, ground(0.6), 399.0, 5.0)
     with pytest.raises(ValueError, match=r"latitude 0\.5, longitude 7\.02 and never over it"):
-        check_above_raster_ground(at, ground(9.0), 0.0, 5.0)
+        check_over_raster_above_ground(at, ground(9.0), 0.0, 5.0)
     with pytest.raises(ValueError, match=r"is 600 m high under .* at 600 m at 3 s"):
-        check_above_raster_ground(at, ground(0.6), 600.0, 5.0)
+        check_over_raster_above_ground(at, ground(0.6), 600.0, 5.0)
     with pytest.raises(ValueError, match=r"height_m is 700: .* at 700 m at 2 s"):
         check_above_terrain(at, 700.0, 5.0)
 

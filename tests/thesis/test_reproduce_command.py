@@ -10,8 +10,8 @@ import pytest
 from click.testing import CliRunner
 
 from components.thesis.reproduce import (
-    footnote_letters_by_text,
     four_digit_text,
+    letters_of_repeated_texts,
     markdown_table_row,
 )
 from components.thesis.rows import Made, Row, predicted
@@ -145,7 +145,7 @@ def test_page_holds_every_row_with_its_verdict(results):
     """docs/thesis.md is what the command writes; times of a run are not compared."""
     page = (ROOT / "docs" / "thesis.md").read_text(encoding="utf-8")
     for made in results.values():
-        said = footnote_letters_by_text(made.rows)
+        said = letters_of_repeated_texts(made.rows)
         assert all(f"{letter} {text}" in page for text, letter in said.items())
         for row in made.rows:
             if row.unit in ("s", "1/s"):

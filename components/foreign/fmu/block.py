@@ -264,8 +264,7 @@ class ForeignFmu(Component):
         return due
 
     def _inputs_and_traffic_at_rows(self, wake: Wake, own: IntArray) -> tuple[FloatArray, Any]:
-        """Return the input values at each row, and the traffic messages with the index of the one
-        that holds at each row.
+        """Return the inputs at each row, and traffic messages with the index of the one that holds.
 
         `own` are the rows that are communication points.
         """

@@ -34,8 +34,7 @@ _ELEMENT = re.compile(r"(.*)\[(\d+)\]")
 
 
 def _output_elements(value: Any, model: FmuModel) -> list[tuple[str, int | None]]:
-    """Return the FMU variables that a value in the scene names, each with the index of its element,
-    or None for the variable itself.
+    """Return the FMU variables a scene's value names, with element index, or None for the whole.
 
     Raises
     ------

@@ -31,9 +31,7 @@ def unit_of_column(name: str) -> str:
 
 @dataclass(frozen=True)
 class Scale:
-    """A unit: its powers of m, s, rad, kg, A, K, mol and cd; x of it are factor x + offset in
-    SI.
-    """
+    """A unit: its powers of m, s, rad, kg, A, K, mol, cd; x of it are factor x + offset in SI."""
 
     powers: tuple[int, ...]
     factor: float

@@ -129,9 +129,7 @@ class Wiring:
                     self.wrong.append(f"{key}.{name}: {error}")
 
     def output_index_and_conversion(self, name: str, output: str) -> tuple[int, float, float]:
-        """Return (index, a, b): an output's index among the FMU's numbers, and the factors by which
-        a number x is the column's a x + b.
-        """
+        """Return (index, a, b): an output's index in the FMU's numbers, whose x becomes a x + b."""
         code = self.names.index(output)
         place = next(i for i, (signal, _) in enumerate(self.layout) if signal == code)
         a, b = self.model.unit_factor_and_offset(unit_of_column(name), self.model.variables[output])

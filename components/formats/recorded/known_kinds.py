@@ -176,8 +176,7 @@ _CAPTURES = (".pcap", ".pcapng", ".cap")
 
 
 def _asterix_time_bytes_and_others(problems: Problems, data: bytes) -> tuple[float, bytes, int]:
-    """Return when the first ASTERIX datagram was captured, the content of all of them joined, and
-    the number of other datagrams.
+    """Return the first ASTERIX datagram's time, their joined content, and the number of others.
 
     Where not all can be read, each is tried by itself: other protocols may look like data blocks,
     and a radar may speak an edition that is not known.

@@ -82,7 +82,7 @@ def _polynomial(coefficients: FloatArray, x: FloatArray) -> FloatArray:
     return total
 
 
-def _sum_weighted_probabilities(
+def _gain_over_pfa_or_miss_probability(
     noise: NoiseTerms,
     shape: int | None,
     echo: FloatArray,
@@ -257,7 +257,9 @@ def _detection_and_miss_functions(
 
     def chain(snr: FloatArray, gain: bool, negligible: float) -> FloatArray:
         echo = np.minimum(pulses * snr, cap)
-        return _sum_weighted_probabilities(noise, shape, echo, gain=gain, negligible=negligible)
+        return _gain_over_pfa_or_miss_probability(
+            noise, shape, echo, gain=gain, negligible=negligible
+        )
 
     return (
         lambda snr: pfa + chain(snr, True, -1.0),

@@ -31,7 +31,9 @@ class Clocks:
         self._activate: Any = None
 
     def next_ticks(self, after: int) -> dict[int, int]:
-        """Return each input clock's next tick after a given one, by number (co-simulation)."""
+        """Return each input clock's next tick after a given one, by number; one without any is left
+        out (co-simulation).
+        """
         found = dict(self.pending)
         for number, clock in enumerate(self._clocks):
             if clock["interval"]:
