@@ -10,8 +10,8 @@ import pickle
 
 import numpy as np
 import pytest
+from recorded_files import read_csv
 
-from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.formats.text_rows import TrafficFileError
 

@@ -12,8 +12,17 @@ from pathlib import Path
 
 import numpy as np
 
+from components.formats.csv_file import recording_of_table
+from components.formats.receiver_logs import UNKNOWN_JSON, parse_receiver_log
 from components.formats.recorded.known_kinds import recording_of_file
-from components.formats.text_rows import TrafficFileError
+from components.formats.reports import build_recording
+from components.formats.text_rows import (
+    Problems,
+    TrafficFileError,
+    iterate_lines,
+    read_content,
+    text_of,
+)
 
 Fix = tuple[float, float, float, float]
 Flights = Mapping[str, Sequence[Fix]]
@@ -210,10 +219,13 @@ def assert_refused_or_whole(path: Path, whole: bytes) -> None:
 
 
 def read_csv(path, ownship=None, altitude=None):
-    """Return the flights of a file of any known kind."""
-    recording = recording_of_file(Path(path), altitude)
-    if ownship is not None:
-        calls = recording.callsigns
-        first = next(n for n in recording.samples if ownship in (n, calls.get(n)))
-        recording.samples = {first: recording.samples.pop(first), **recording.samples}
-    return recording.flights()
+    """Return the flights of a CSV file or a receiver's log, as the readers of any kind do."""
+    problems = Problems(str(path))
+    data = read_content(Path(path), problems)
+    log = parse_receiver_log(problems, data)
+    if log is not None:
+        return build_recording(problems, log, ownship, altitude).flights()
+    if data[:64].lstrip(b"\xef\xbb\xbf \t\r\n").startswith((b"{", b"[")):
+        problems.fail(UNKNOWN_JSON)
+    lines = iterate_lines(text_of(data, problems))
+    return recording_of_table(problems, lines, ownship, altitude).flights()

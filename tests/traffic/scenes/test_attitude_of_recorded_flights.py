@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pymap3d
 import pytest
+from recorded_files import read_csv
 from wired import chain, rows, run, sensor
 
 from components.display.terminal import derived_attitude_lines
 from components.flights.attitude import attitude_from_path, fit_velocity_and_acceleration
-from components.formats.csv_file import read_csv
 from components.formats.daa_file import read_daa
 from components.traffic.recorded import derived_attitude_report
 
