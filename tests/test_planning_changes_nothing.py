@@ -230,7 +230,7 @@ class PathCells:
     def __len__(self) -> int:
         return len(self.range_m)
 
-    def of_row(self, name: str) -> np.ndarray:
+    def field_at_rows(self, name: str) -> np.ndarray:
         assert name == "own_alt_m"
         return self._own
 

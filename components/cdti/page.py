@@ -60,7 +60,7 @@ class Admission:
 
     The address holds a token. The first page that comes with it may decide, and gets a key by which
     it is known when it comes back; the token then is used up, and only lets watch. When the page of
-    the operator is gone for good, `renew` gives a new token.
+    the operator is gone for good, `unused_operator_token` gives a new one.
     """
 
     def __init__(self) -> None:

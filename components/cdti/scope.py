@@ -1,7 +1,7 @@
 """The content of the display: it receives a run's messages, and gives the picture at an instant.
 
-The thread of the simulation calls `listen`; any other may call `picture`. What they share is
-replaced as a whole, never changed.
+The thread of the simulation calls `store_message`; any other may call `page_content`. What they
+share is replaced as a whole, never changed.
 """
 
 import math

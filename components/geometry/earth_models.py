@@ -303,7 +303,7 @@ class LineOfSight:
     earth : {"flat_earth", "local_radii", "daidalus_sphere", "geodesic", "ellipsoid"}
         See the module.
     attitude : {"exact", "small_angle"}
-        As for `components.geometry.sensor_angles`.
+        As for `components.geometry.sensor_axes`.
 
     Raises
     ------

@@ -31,7 +31,7 @@ class FusedDetections(MeasuredLine, TrueLine, StatedErrors, Message):
     Parameters
     ----------
     contributors : (entries,) of int
-        Bit i is set when ``sensors[i]`` contributed; of the type `mask_type` gives.
+        Bit i is set when ``sensors[i]`` contributed; of the type `mask_dtype_for_sensors` gives.
     angle_source, range_source : (entries,) of int
         Index into `sensors`; -1 for none.
     measured_tick : (entries,) of int

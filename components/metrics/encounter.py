@@ -45,7 +45,8 @@ from dsa_des.replicas.outage_times import (
 from dsa_des.scene.scene import Scene
 from dsa_des.studies.metric import EVENT, NUMBER, RATIO, Group, RatioOf, Result, blocks_recording
 
-#: By what an approach may be censored, see `components.flights.closest_approach.end_of_look`.
+#: By what an approach may be censored, see
+#: `components.flights.closest_approach.describe_censoring_end`.
 _ENDS = ("", START, END, "the start of its flight", "the end of its flight")
 #: The end of a run that a block ended before its time.
 _EARLY_END = "the early end of the run"

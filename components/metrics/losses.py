@@ -35,7 +35,7 @@ from dsa_des.arrays.types import FloatArray, IntArray
 def find_closest_approach(flight: RelativeFlight) -> tuple[float, float, str]:
     """Return a flight's smallest range (m), its earliest time (s), and a word for its censoring.
 
-    See `components.flights.closest_approach.end_of_look`.
+    See `components.flights.closest_approach.describe_censoring_end`.
     """
     best = (float("inf"), float("nan"))
     looked_s = np.full(2, np.nan)

@@ -82,8 +82,8 @@ class TriangleMesh:
         scan lines, exact along each line and by the midpoint rule across them. Measured at 1024
         rows over 400 directions: 4e-5 of the area at worst for an ellipsoid, 3e-4 for a thin box,
         8e-4 (3e-5 on average) for an ellipsoid with box wings. About 6 µs per direction for a
-        convex mesh of 1,500 triangles and 3-8 ms for another one: use `tabulate` before
-        simulating.
+        convex mesh of 1,500 triangles and 3-8 ms for another one: use `build_silhouette_table`
+        before simulating.
         """
         u = np.stack(np.broadcast_arrays(check_finite("u_x", u_x), u_y, u_z), axis=-1)
         shape = u.shape[:-1]

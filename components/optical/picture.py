@@ -117,10 +117,11 @@ def capsule_and_plate_outlines(
 ) -> tuple[FloatArray, FloatArray]:
     """Return targets' capsule and plate outlines as unit vectors in north-east-down axes.
 
-    Shapes (n, points, 3); the bodies are those of `components.optical.silhouette.union_area`, with
-    front, side and horizontal areas. A circle is drawn as a polygon of its area. The outline lies
-    in the plane across the line of sight through the target's middle: what perspective adds is the
-    ratio of the target's size to its range, of a picture point's distance from the middle.
+    Shapes (n, points, 3); the bodies are those of
+    `components.optical.silhouette.exact_area_of_bodies_union`, with front, side and horizontal
+    areas. A circle is drawn as a polygon of its area. The outline lies in the plane across the
+    line of sight through the target's middle: what perspective adds is the ratio of the target's
+    size to its range, of a picture point's distance from the middle.
     """
     front, side, flat = bodies_m2
     along = np.stack(unit_vector_unchecked(azimuth_rad, elevation_rad), axis=-1)

@@ -3,7 +3,7 @@
 Part of a measurement's error was in the same sensor's last one already. A value on a grid is off by
 the same as long as it stays in its cell, a bias throughout a run, an error with a correlation time
 for that long. A filter that takes such errors for new ones at every look is too sure; what is new
-in a measurement is worked out by `components.estimation.kalman.variance_of_what_is_new`.
+in a measurement is worked out by `components.estimation.kalman.equivalent_independent_variance`.
 """
 
 import math

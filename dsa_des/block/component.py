@@ -255,7 +255,8 @@ class Component:
         """Return what work lacked → (failures, cases), or an array (2, runs) of both by run.
 
         Asked after it has run; counts are over every row that it has seen. A block that serves all
-        runs gives both of each run, (2, runs) (`dsa_des.record.failure_counts.count_cases`).
+        runs gives both of each run, (2, runs)
+        (`dsa_des.record.failure_counts.counts_with_cases_added`).
         """
         return {}
 

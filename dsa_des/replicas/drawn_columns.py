@@ -335,7 +335,7 @@ def _validate_and_note_reads(old: Any, paths: Sequence[Path]) -> Any:
     return _watched_type(type(old), drawn).model_validate(given)
 
 
-#: Fields that were read while `_reading`, by watched types; None at other times.
+#: Fields that were read while `_track_reads`, by watched types; None at other times.
 _noted: list[set[str]] = []
 # What does not show any field's value. All else of a model's own may show all of them.
 _HARMLESS = frozenset({"__class__", "__pydantic_fields_set__"})

@@ -10,7 +10,8 @@ is that of a ratio of dependent sums (W. G. Cochran, "Sampling techniques", 3rd 
 chapter 6): with residuals w (m - R n) its variance is Σ w² (m - R n)² / (Σ w n)². Taking the
 denominator as known, as the usual tools do, is another number: `PairedRatio.unpaired_error`.
 
-The interval is made for few events of uneven weights (`gamma`: `statistics.gamma_interval`).
+The interval is made for few events of uneven weights (`gamma`:
+`statistics.gamma_interval_of_ratio`).
 
 Runs that hang together (several of one encounter, or copies of it) are one *cluster*: their terms
 are added up first, and clusters are what is independent.

@@ -86,7 +86,7 @@ class GaussMarkov:
         targets : (n,) array of uint64, or one key
             Whose process it is, as for `Stream.uniform`.
         instants_ns : (n,) array of int64
-            Since the start of the run (`dsa_des.time.clock.nanosecond_of`).
+            Since the start of the run (`dsa_des.time.clock.ticks_to_nanoseconds`).
         process : int
             Which of a target's independent processes, 0 to 2047.
         run : (n,) array of int64, or one number

@@ -125,12 +125,12 @@ TEN = """
 import sys
 from pathlib import Path
 from dsa_des.files.output_folder import OutputFolder
-from dsa_des.files.output_names import claim_folder
-with OutputFolder(Path("runs"), "scene").writing() as folder:
+from dsa_des.files.output_names import make_numbered_folder
+with OutputFolder(Path("runs"), "scene").write_then_rename() as folder:
     (folder / "me").write_text(sys.argv[1])
     print("ready", flush=True)
     sys.stdin.read()
-(claim_folder(Path("studies"), "study") / "me").write_text(sys.argv[1])
+(make_numbered_folder(Path("studies"), "study") / "me").write_text(sys.argv[1])
 """
 
 

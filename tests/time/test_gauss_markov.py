@@ -30,7 +30,7 @@ class OneDraw:
         assert not run.any()  # a stream of one run is that of all its rows
         return self
 
-    def normals(self, targets, scans, draw):
+    def three_normals(self, targets, scans, draw):
         targets = np.broadcast_to(targets, scans.shape)
         self.found = []
         columns = []

@@ -1,6 +1,6 @@
 """A running FMU: its communication points, events, clocks, and the states it was saved in.
 
-For the process in which it runs; what we ask it for is in `components.foreign.fmu.worker`.
+For the process in which it runs; what we ask it for is in `components.foreign.fmu.running.worker`.
 """
 
 import ctypes as c
