@@ -24,8 +24,7 @@ PUBLISHED = {
 BY_A_LOOP = {
     ("pair, 135°", 30): (119, 200_000),
     ("ring of 4", 30): (119, 30_000),
-    # With goals taken each second, as the scene does; each half second 331 of 28,000.
-    ("ring of 6", 30): (276, 20_000),
+    ("ring of 6", 30): (331, 28_000),
 }
 _AXES = {"crossing_deg": "pair, {}°", "aircraft": "ring of {}"}
 _CONFIDENCE = 0.95
